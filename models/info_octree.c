@@ -1,4 +1,5 @@
 #include "info_octree.h"
+#include "info_scan.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -43,6 +44,7 @@ void info_print_octree(const struct octree *tree, const struct octree_shares *sh
 	}
 	printf("  %-14s  %.2f bits a leaf", "all", bits);
 	printf(shares->codes > 0 ? ", %.2f packed\n" : "\n", packed);
+	info_print_scan(tree);
 }
 
 cJSON *info_octree_json(const struct octree *tree, const struct octree_shares *shares, double scale)
@@ -54,6 +56,7 @@ cJSON *info_octree_json(const struct octree *tree, const struct octree_shares *s
 	cJSON_AddNumberToObject(root, "levels", tree->levels);
 	cJSON_AddNumberToObject(root, "leaves", (double)tree->n_leaves);
 	cJSON_AddNumberToObject(root, "codes", (double)tree->n_codes);
+	info_add_scan(root, tree);
 	cJSON_AddNumberToObject(root, "leaf_edge", ldexp(tree->edge * scale, -tree->levels));
 	bits = cJSON_AddObjectToObject(root, "bits_per_leaf");
 	for (int i = 0; i < N_STREAMS; i++)

@@ -93,6 +93,7 @@ static int of_file(struct octree **out, struct octree_input *input, const struct
 
 	if (rc != PSR_OK)
 		return rc;
+	source.scan = wish->with_scan ? source.scan : 0;
 	rc = build(out, &source, wish, err);
 	count = octree_source_count(&source);
 	input->n_points = count.n_read;

@@ -10,6 +10,7 @@ struct octree_wish {
 	double spacing;      /* or if that is 0 by the number of points, or for a mesh by `resolution` */
 	uint32_t resolution; /* pixels; if it decides, a part of a cloud is enough up to PSR_PREVIEW_RESOLUTION */
 	uint64_t memory;     /* bytes to sort in */
+	int with_scan;       /* leaves keep what a laser scan tells, struct octree_scan */
 	void (*on_progress)(const char *stage, uint64_t done, uint64_t total, void *userdata);
 	void *userdata;
 };

@@ -18,6 +18,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define FILE_MINOR 0 /* of files without octrees, which are as before these */
 #define FILE_MINOR_OCTREE 1
 #define FILE_MINOR_POINTS 2
+#define FILE_MINOR_SCAN 3
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */
 #define FILE_HEADER_BYTES 64
@@ -45,7 +46,8 @@ enum section_count {
 
 enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY,
 	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, SECTION_END_OF_OCTREE = 31,
-	              SECTION_CALIBRATION = 31, SECTION_POINTS, SECTION_FIRST_OF_POINTS, N_KNOWN_SECTIONS = 35 };
+	              SECTION_CALIBRATION = 31, SECTION_POINTS, SECTION_FIRST_OF_POINTS, SECTION_FIRST_OF_SCAN = 35,
+	              N_KNOWN_SECTIONS = 40 };
 
 struct section_spec {
 	char type[5];

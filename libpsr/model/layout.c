@@ -59,6 +59,11 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_POINTS] = { "DPNT", 1, 0, COUNT_ONE, POINTS_BYTES, 0 },
 	SET("DGRP", COUNT_GROUPS, 32, group),
 	SET("DWRD", COUNT_POINTS, 16, word),
+	TREE("OINT", COUNT_LEAVES, 2, scan.intensity),
+	TREE("OCLS", COUNT_LEAVES, 1, scan.class),
+	TREE("ORET", COUNT_LEAVES, 1, scan.returns),
+	TREE("OTIM", COUNT_LEAVES, 4, scan.time),
+	TREE("OTSC", COUNT_ONE, 16, scan.time_scale),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -114,9 +119,9 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 {
 	const ptrdiff_t k = spec - section_table;
 
-	if (k >= SECTION_POINTS)
+	if (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN)
 		return !content->has_points;
-	if (k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE)
+	if ((k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE) || k >= SECTION_FIRST_OF_SCAN)
 		return !content->has_octree;
 	return (k == SECTION_BLOCKS || k >= SECTION_FIRST_ARRAY) && !content->has_blocks;
 }
@@ -276,6 +281,15 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 	}
 }
 
+/* The first version that knows all sections. */
+static unsigned minor_of(const struct content *content)
+{
+	for (int k = SECTION_FIRST_OF_SCAN; k < N_KNOWN_SECTIONS; k++)
+		if (is_present(k, content))
+			return FILE_MINOR_SCAN;
+	return content->has_points ? FILE_MINOR_POINTS : content->has_octree ? FILE_MINOR_OCTREE : FILE_MINOR;
+}
+
 uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 {
 	uint64_t n_sections = 0, n_chunks = 0, at = 0;
@@ -297,8 +311,7 @@ uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 		return NULL;
 	memcpy(bytes, FILE_MAGIC, 8);
 	file_put(bytes + HEADER_MAJOR, 2, FILE_MAJOR);
-	file_put(bytes + HEADER_MINOR, 2, content->has_points ? FILE_MINOR_POINTS
-	                                  : content->has_octree ? FILE_MINOR_OCTREE : FILE_MINOR);
+	file_put(bytes + HEADER_MINOR, 2, minor_of(content));
 	file_put(bytes + HEADER_N_SECTIONS, 4, n_sections);
 	file_put(bytes + HEADER_FILE_SIZE, 8, *n_bytes);
 	file_put(bytes + HEADER_N_CHUNKS, 4, n_chunks);

@@ -226,7 +226,17 @@ static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8
 	return at;
 }
 
-/* Packs the octree, if there is one. */
+/* Steps of a packed octree are coarser models, and these have no scan. */
+static int has_scan(const uint8_t *image)
+{
+	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++)
+		for (int k = SECTION_FIRST_OF_SCAN; k < N_KNOWN_SECTIONS; k++)
+			if (file_is_section(image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, k))
+				return 1;
+	return 0;
+}
+
+/* Packs the octree, if there is one, in steps. */
 static int pack_octree(struct packer *p, const uint8_t *image, struct psr_error *err)
 {
 	struct psr_pool *pool = NULL;
@@ -234,7 +244,7 @@ static int pack_octree(struct packer *p, const uint8_t *image, struct psr_error 
 	int code;
 
 	p->packing = PACKING_ZSTD;
-	if (!pack_find_octree(&tree, image))
+	if (!pack_find_octree(&tree, image) || has_scan(image))
 		return PSR_OK;
 	if (tree.n_leaves > OCTREE_CHUNK && (code = psr_pool_create(&pool, psr_pool_all_cores(), err)) != PSR_OK)
 		return code;

@@ -306,7 +306,7 @@ static int check_set(const struct reader *r, const struct content *content)
 {
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
-		const char *first = k >= SECTION_POINTS ? "DPNT" : k < SECTION_OCTREE ? "BLKS" : "OCTR";
+		const char *first = k < SECTION_OCTREE ? "BLKS" : k < SECTION_POINTS || k >= SECTION_FIRST_OF_SCAN ? "OCTR" : "DPNT";
 
 		if (section_is_foreign(spec, content) && r->entry[k] >= 0)
 			return bad(r, "section %s is there, and %s, which tells its length, is missing", spec->type, first);

@@ -98,6 +98,19 @@ static int fail_offset(const struct octree *tree, uint64_t i, const char *name, 
 	return fail("OOFF", "the offset of leaf %" PRIu64 " is %d; offsets are below %d", i, tree->offset[i], OCTREE_OFFSETS);
 }
 
+static int check_scan(const struct octree_scan *scan, const char *name, struct psr_error *err)
+{
+	if ((scan->time == NULL) != (scan->time_scale == NULL))
+		return fail(scan->time == NULL ? "OTSC" : "OTIM", "it is there without section %s",
+		            scan->time == NULL ? "OTIM" : "OTSC");
+	if (scan->time_scale == NULL)
+		return PSR_OK;
+	const double first = (*scan->time_scale)[0], step = (*scan->time_scale)[1];
+	if (!isfinite(first) || !(step >= 0) || !isfinite(first + step * UINT32_MAX))
+		return fail("OTSC", "times from %g in steps of %g are not finite, or go back", first, step);
+	return PSR_OK;
+}
+
 int model_validate_octree(const struct octree *tree, struct psr_pool *pool, const char *name, struct psr_error *err)
 {
 	struct psr_error what = { 0 };
@@ -117,5 +130,5 @@ int model_validate_octree(const struct octree *tree, struct psr_pool *pool, cons
 	for (uint64_t i = 0; tree->offset != NULL && i < tree->n_leaves; i += STRETCH)
 		if ((any_offset(tree, i) & ~(OCTREE_OFFSETS - 1)) != 0)
 			return fail_offset(tree, i, name, err);
-	return PSR_OK;
+	return check_scan(&tree->scan, name, err);
 }

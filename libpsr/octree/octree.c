@@ -12,6 +12,11 @@ void octree_destroy(struct octree *tree)
 	free(tree->normal);
 	free(tree->color);
 	free(tree->offset);
+	free(tree->scan.intensity);
+	free(tree->scan.class);
+	free(tree->scan.returns);
+	free(tree->scan.time);
+	free(tree->scan.time_scale);
 	free(tree);
 }
 

@@ -19,6 +19,16 @@ struct octree_skip {
 	uint64_t path, code, leaf; /* of the node; of its code; of its first leaf */
 };
 
+/* What a laser scan tells of each leaf, by streams that each may be NULL: the mean of intensities, and all else of the
+ * first of the leaf's points in the order of their source. Inner nodes have none. */
+struct octree_scan {
+	uint16_t *intensity;
+	uint8_t *class;          /* as the ASPRS numbers them: 2 is ground */
+	uint8_t *returns;        /* low 4 bits: the number of the return in its pulse; high 4 bits: of how many */
+	uint32_t *time;          /* GPS time, in steps */
+	double (*time_scale)[2]; /* the time of 0, and seconds of a step; not NULL where `time` is not */
+};
+
 struct octree {
 	int levels;
 	int is_one_sided;          /* 1: normals point out of a solid, and leaves are not seen from their backs */
@@ -31,6 +41,7 @@ struct octree {
 	uint16_t *normal;          /* of each leaf in Morton order: base/direction.h; NULL: none */
 	uint8_t (*color)[3];       /* sRGB; NULL: none */
 	uint8_t *offset;           /* [B] 5.1: 0..OCTREE_OFFSETS - 1, octree_offset(); NULL: none */
+	struct octree_scan scan;
 };
 
 void octree_destroy(struct octree *tree); /* NULL is fine */

@@ -49,6 +49,15 @@ assert 0.5 * cells < o["leaves"] < 1.5 * cells, (o["leaves"], cells)' "$work/bal
 check "text says the same, with the bits of each array" \
 	bash -c 'psr-model info "$1" | grep -qE "^  normals +16\.00 bits a leaf"' - "$work/ball.psr"
 
+psr-model build "$work/ball.las" --representation octree --levels 7 --scan -q -o "$work/scan.psr"
+psr-model info "$work/scan.psr" --json >"$work/scan.json"
+is "with --scan it keeps the classes of the cloud, and no stream of zeros" \
+	"{'classes': {'2': $(value "$work/ball.json" octree.leaves)}}" "$(value "$work/scan.json" octree.scan)"
+psr-model build "$work/ball.las" --representation octree --levels 7 --scan --pack -q -o "$work/scan.psr"
+is "and so it does packed" "$(value "$work/scan.json" content_id)" \
+	"$(psr-model info "$work/scan.psr" --json >"$work/scan.json"; value "$work/scan.json" content_id)"
+refuses "a scan of blocks" 2 "add --representation octree" psr-model build "$work/ball.las" --scan -o "$work/none.psr"
+
 psr-model build "$work/ball.las" --representation octree --levels 7 --memory 1m -q -o "$work/runs.psr"
 is "sorting on disk makes the same file" "$(sha256sum <"$work/ball.psr")" "$(sha256sum <"$work/runs.psr")"
 check "a cloud becomes an octree without being asked" psr-model build "$work/ball.las" --levels 7 -q -o "$work/runs.psr"

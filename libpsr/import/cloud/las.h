@@ -40,6 +40,12 @@ static inline double las_get_double(const uint8_t *p)
 	return x;
 }
 
+/* Returns whether points have a GPS time. */
+static inline int las_has_time(const struct las *las)
+{
+	return las->format != 0 && las->format != 2;
+}
+
 /* Reads the header; path, bytes and n_bytes are set. Ensures that the file has room for all points. FORMAT,
  * UNSUPPORTED. */
 int las_read_header(struct las *las, struct psr_error *err);

@@ -81,6 +81,17 @@ static void put_color(uint8_t color[3], const struct las_tint *tint, const uint8
 	}
 }
 
+/* Point formats 6 and above have the fields of those before elsewhere, and wider ones. */
+static void put_scan(struct octree_point *point, const struct las *las, const uint8_t *p)
+{
+	const int is_new = las->format >= 6;
+
+	point->intensity = (uint16_t)las_get(p + 12, 2);
+	point->returns = is_new ? p[14] : (uint8_t)((p[14] & 7) | (p[14] >> 3 & 7) << 4);
+	point->class = is_new ? p[16] : p[15] & 31;
+	point->time = las_has_time(las) ? las_get_double(p + (is_new ? 22 : 20)) : 0.0;
+}
+
 static int read_points(size_t *n, struct octree_point *points, size_t room, void *userdata, struct psr_error *err)
 {
 	struct las_source *s = userdata;
@@ -96,6 +107,7 @@ static int read_points(size_t *n, struct octree_point *points, size_t room, void
 			point->at[c] = (double)(int32_t)(uint32_t)las_get(p + 4 * c, 4) * s->las.scale[c] + s->las.offset[c];
 		if (!s->tint.is_none)
 			put_color(point->color, &s->tint, p);
+		put_scan(point, &s->las, p);
 		++*n;
 	}
 	return rc;
@@ -191,6 +203,8 @@ int las_source_open_part(struct octree_source *out, const char *path, uint64_t m
 		return rc;
 	}
 	out->has_color = !s->tint.is_none;
+	out->scan = 1u << OCTREE_INTENSITY | 1u << OCTREE_CLASS | 1u << OCTREE_RETURNS
+	            | (unsigned)las_has_time(&s->las) << OCTREE_TIME;
 	out->n_points = (s->las.n_points + s->step - 1) / s->step;
 	return PSR_OK;
 }

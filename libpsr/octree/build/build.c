@@ -3,6 +3,7 @@
 #include <string.h>
 #include "leaves.h"
 #include "runs.h"
+#include "scan.h"
 #include "base/direction.h"
 
 #define BATCH 4096
@@ -13,6 +14,7 @@ struct building {
 	struct psr_error *err;
 	uint64_t n_points;
 	double low[3], high[3], edge; /* of the points; of the cube around them */
+	double time[2];               /* the least and the greatest */
 	int levels;
 	struct runs runs;
 	struct octree_maker maker;
@@ -63,6 +65,10 @@ static int bound_point(struct building *b, const struct octree_point *point)
 		b->low[c] = fmin(b->low[c], point->at[c]);
 		b->high[c] = fmax(b->high[c], point->at[c]);
 	}
+	if (b->source->scan >> OCTREE_TIME & 1 && isfinite(point->time)) {
+		b->time[0] = fmin(b->time[0], point->time);
+		b->time[1] = fmax(b->time[1], point->time);
+	}
 	return PSR_OK;
 }
 
@@ -98,6 +104,8 @@ static int find_cube(struct building *b)
 		b->low[c] = INFINITY;
 		b->high[c] = -INFINITY;
 	}
+	b->time[0] = INFINITY;
+	b->time[1] = -INFINITY;
 	if (read_points(b, "bounds", bound_point) != PSR_OK)
 		return b->err->code;
 	if (b->n_points == 0)
@@ -125,6 +133,7 @@ static uint16_t normal_code(const float normal[3])
 
 static int sort_point(struct building *b, const struct octree_point *point)
 {
+	struct scan_record scan;
 	struct record record = { .color = { point->color[0], point->color[1], point->color[2] },
 		                     .normal = b->source->has_normal ? normal_code(point->normal) : RECORD_NO_NORMAL };
 	uint32_t at[3];
@@ -139,7 +148,11 @@ static int sort_point(struct building *b, const struct octree_point *point)
 		record.part[c] = (uint8_t)fmin(256.0 * (place - inside), 255.0);
 	}
 	record.path = octree_path(at);
-	return runs_put(&b->runs, &record, b->err);
+	if (b->source->scan == 0)
+		return runs_put(&b->runs, &record, b->err);
+	scan_of_point(&scan, point, b->time);
+	scan.record = record;
+	return runs_put(&b->runs, &scan.record, b->err);
 }
 
 /* The points of one leaf. */
@@ -147,6 +160,7 @@ struct sum {
 	uint64_t n, path, color[3], part[3];
 	int64_t normal[3];
 	uint16_t first; /* of the normals */
+	struct scan_sum scan;
 };
 
 static void add_record(struct sum *sum, const struct record *record)
@@ -167,26 +181,13 @@ static void add_record(struct sum *sum, const struct record *record)
 static int leaf_room(struct building *b, uint64_t n, uint64_t *room)
 {
 	const uint64_t more = n + n / 4 + 4096;
-	void *part, *color, *normal;
+	struct octree *tree = b->maker.tree;
 
 	if (n < *room)
 		return 1;
-	part = realloc(b->built.part, more * 3);
-	if (part == NULL)
+	if (!leaves_grow(&b->built.part, more) || (b->source->has_color && !leaves_grow(&tree->color, more)) ||
+	    (b->source->has_normal && !leaves_grow(&tree->normal, more)) || !scan_grow(&tree->scan, b->source->scan, more))
 		return 0;
-	b->built.part = part;
-	if (b->source->has_color) {
-		color = realloc(b->maker.tree->color, more * 3);
-		if (color == NULL)
-			return 0;
-		b->maker.tree->color = color;
-	}
-	if (b->source->has_normal) {
-		normal = realloc(b->maker.tree->normal, more * sizeof *b->maker.tree->normal);
-		if (normal == NULL)
-			return 0;
-		b->maker.tree->normal = normal;
-	}
 	*room = more;
 	return 1;
 }
@@ -217,6 +218,7 @@ static int end_leaf(struct building *b, const struct sum *sum, uint64_t *room)
 		tree->normal[leaf] = mean_normal(sum);
 		b->built.n_without += tree->normal[leaf] == RECORD_NO_NORMAL;
 	}
+	scan_put(&tree->scan, leaf, &sum->scan, sum->n);
 	return octree_maker_put(&b->maker, sum->path, b->err);
 }
 
@@ -233,6 +235,8 @@ static int merge(struct building *b)
 			sum = (struct sum){ .first = RECORD_NO_NORMAL };
 		}
 		add_record(&sum, record);
+		if (b->source->scan != 0)
+			scan_add(&sum.scan, (const struct scan_record *)(const void *)record);
 		if (++done % 65536 == 0) {
 			built_progress(b->options, "merge", done, b->n_points);
 			if (psr_is_cancelled(b->options->cancel))
@@ -252,7 +256,7 @@ static int build(struct building *b)
 
 	if (rc != PSR_OK)
 		return rc;
-	rc = runs_init(&b->runs, b->options->folder, 3 * b->levels, b->options->memory, b->err);
+	rc = runs_init(&b->runs, b->options->folder, 3 * b->levels, b->source->scan != 0, b->options->memory, b->err);
 	if (rc == PSR_OK)
 		rc = read_points(b, "points", sort_point);
 	if (rc == PSR_OK && b->n_points == 0)
@@ -266,6 +270,8 @@ static int build(struct building *b)
 		return rc;
 	memcpy(b->built.tree->low, b->low, sizeof b->low);
 	b->built.tree->edge = b->edge;
+	if (!scan_end(b->built.tree, b->time))
+		return psr_fail(b->err, PSR_ERR_MEMORY, "%s: no memory for the times of points", b->source->name);
 	b->built.tree->is_cloud = 1;
 	rc = built_normals(&b->built, b->options);
 	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "%s: %s", b->source->name, rc == PSR_ERR_CANCELLED ? "cancelled" :

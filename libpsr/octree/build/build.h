@@ -10,13 +10,20 @@ struct octree_point {
 	double at[3];
 	uint8_t color[3]; /* sRGB */
 	float normal[3];  /* of any length; 0,0,0: none, as anything that is not finite */
+	/* As in struct octree_scan, where the source has them. */
+	uint8_t class, returns;
+	uint16_t intensity;
+	double time;      /* seconds; not finite: as the first one of all */
 };
+
+enum octree_scan_stream { OCTREE_INTENSITY, OCTREE_CLASS, OCTREE_RETURNS, OCTREE_TIME, OCTREE_SCAN_STREAMS };
 
 /* Where points come from; they are read twice, and have to be the same both times. Functions return PSR_OK or an error
  * with its text. */
 struct octree_source {
 	const char *name;   /* for errors: the file's */
 	int has_color, has_normal;
+	unsigned scan;      /* bit s: points have stream s of enum octree_scan_stream */
 	uint64_t n_points;  /* for progress alone */
 	/* Goes to the first point. */
 	int (*rewind)(void *userdata, struct psr_error *err);
@@ -46,7 +53,8 @@ void octree_build_options_default(struct octree_build_options *options);
 int octree_build_levels(int *levels, const struct octree_build_options *options, const char *name, double edge,
                         struct psr_error *err);
 
-/* Builds a tree with normals, offsets, and colours if the source has any. Colours and places of a leaf's points are
+/* Builds a tree with normals, offsets, and colours and streams of a scan if the source has any; a stream of zeros alone is
+ * none. Colours and places of a leaf's points are
  * averaged, and so are normals of the source. Leaves whose points have none blend those of the cells around them: least
  * squares over 27 cells of some ten leaves, whose sides agree; the highest place of what hangs together looks up.
  *

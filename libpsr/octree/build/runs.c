@@ -13,12 +13,14 @@
 #define DIGIT 11
 #define LEAST_ROOM 64
 
-int runs_init(struct runs *runs, const char *folder, int bits, uint64_t memory, struct psr_error *err)
+int runs_init(struct runs *runs, const char *folder, int bits, int is_scan, uint64_t memory, struct psr_error *err)
 {
-	*runs = (struct runs){ .folder = folder, .bits = bits, .fd = -1, .room = memory / (2 * sizeof(struct record)) };
+	const size_t bytes = is_scan ? sizeof(struct scan_record) : sizeof(struct record);
+
+	*runs = (struct runs){ .folder = folder, .bits = bits, .bytes = bytes, .fd = -1, .room = memory / (2 * bytes) };
 	runs->room = runs->room > LEAST_ROOM ? runs->room : LEAST_ROOM;
-	runs->record = psr_alloc_array(runs->room, sizeof *runs->record);
-	runs->spare = psr_alloc_array(runs->room, sizeof *runs->spare);
+	runs->record = psr_alloc_array(runs->room, bytes);
+	runs->spare = psr_alloc_array(runs->room, bytes);
 	if (runs->record == NULL || runs->spare == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory to sort %zu points at a time", runs->room);
 	return PSR_OK;
@@ -34,29 +36,49 @@ void runs_fini(struct runs *runs)
 		close(runs->fd);
 }
 
-/* Sorts by digits from the lowest on, which keeps the order of equal paths. */
-static void sort(struct runs *runs)
+/* A record begins with its path. */
+static inline uint64_t path_of(const uint8_t *record)
+{
+	uint64_t path;
+
+	memcpy(&path, record, sizeof path);
+	return path;
+}
+
+/* Sorts by digits from the lowest on, which keeps the order of equal paths. bytes: a constant of the caller. */
+static inline __attribute__((always_inline)) void sort_records(struct runs *runs, size_t bytes)
 {
 	size_t place[1 << DIGIT];
 
 	for (int shift = 0; shift < runs->bits; shift += DIGIT) {
-		struct record *swap = runs->record;
+		uint8_t *swap = runs->record;
 		size_t sum = 0;
 
 		memset(place, 0, sizeof place);
 		for (size_t i = 0; i < runs->n; i++)
-			place[runs->record[i].path >> shift & ((1 << DIGIT) - 1)]++;
+			place[path_of(runs->record + i * bytes) >> shift & ((1 << DIGIT) - 1)]++;
 		for (size_t d = 0; d < sizeof place / sizeof *place; d++) {
 			const size_t count = place[d];
 
 			place[d] = sum;
 			sum += count;
 		}
-		for (size_t i = 0; i < runs->n; i++)
-			runs->spare[place[runs->record[i].path >> shift & ((1 << DIGIT) - 1)]++] = runs->record[i];
+		for (size_t i = 0; i < runs->n; i++) {
+			const uint8_t *record = runs->record + i * bytes;
+
+			memcpy(runs->spare + bytes * place[path_of(record) >> shift & ((1 << DIGIT) - 1)]++, record, bytes);
+		}
 		runs->record = runs->spare;
 		runs->spare = swap;
 	}
+}
+
+static void sort(struct runs *runs)
+{
+	if (runs->bytes == sizeof(struct record))
+		sort_records(runs, sizeof(struct record));
+	else
+		sort_records(runs, sizeof(struct scan_record));
 }
 
 /* Opens a file that has no name, or loses it at once. */
@@ -78,8 +100,8 @@ static int open_file(struct runs *runs, struct psr_error *err)
 
 static int write_run(struct runs *runs, struct psr_error *err)
 {
-	const uint8_t *bytes = (const uint8_t *)runs->record;
-	size_t left = runs->n * sizeof *runs->record;
+	const uint8_t *bytes = runs->record;
+	size_t left = runs->n * runs->bytes;
 	int rc = runs->fd < 0 ? open_file(runs, err) : PSR_OK;
 
 	if (rc != PSR_OK)
@@ -115,17 +137,17 @@ int runs_put(struct runs *runs, const struct record *record, struct psr_error *e
 		if (rc != PSR_OK)
 			return rc;
 	}
-	runs->record[runs->n++] = *record;
+	memcpy(runs->record + runs->n++ * runs->bytes, record, runs->bytes);
 	return PSR_OK;
 }
 
 static int refill(struct runs *runs, struct run *run, struct psr_error *err)
 {
-	size_t want = runs->run_room * sizeof *run->record, got = 0;
+	size_t want = runs->run_room * runs->bytes, got = 0;
 
 	want = want < run->end - run->at ? want : run->end - run->at;
 	while (got < want) {
-		const ssize_t n = pread(runs->fd, (uint8_t *)run->record + got, want - got, (off_t)(run->at + got));
+		const ssize_t n = pread(runs->fd, run->record + got, want - got, (off_t)(run->at + got));
 
 		if (n < 0 && errno == EINTR)
 			continue;
@@ -136,14 +158,16 @@ static int refill(struct runs *runs, struct run *run, struct psr_error *err)
 	}
 	run->at += want;
 	run->next = 0;
-	run->n = want / sizeof *run->record;
+	run->n = want / runs->bytes;
 	return PSR_OK;
 }
 
 /* Returns whether run a comes before run b: by path, then by the order in which they were written. */
 static int is_before(const struct runs *runs, uint32_t a, uint32_t b)
 {
-	const uint64_t x = runs->run[a].record[runs->run[a].next].path, y = runs->run[b].record[runs->run[b].next].path;
+	const struct run *first = &runs->run[a], *second = &runs->run[b];
+	const uint64_t x = path_of(first->record + first->next * runs->bytes);
+	const uint64_t y = path_of(second->record + second->next * runs->bytes);
 
 	return x < y || (x == y && a < b);
 }
@@ -186,7 +210,7 @@ int runs_end(struct runs *runs, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_LIMIT, "%zu runs, of %zu points each, are too many to merge; allow more memory",
 		                runs->n_runs, runs->room);
 	for (size_t i = 0; i < runs->n_runs && rc == PSR_OK; i++) {
-		runs->run[i].record = runs->record + i * runs->run_room;
+		runs->run[i].record = runs->record + i * runs->run_room * runs->bytes;
 		rc = refill(runs, &runs->run[i], err);
 		runs->heap[runs->n_heap++] = (uint32_t)i;
 	}
@@ -200,12 +224,16 @@ const struct record *runs_next(struct runs *runs, int *rc, struct psr_error *err
 	struct run *run;
 
 	*rc = PSR_OK;
-	if (runs->fd < 0) /* `written` counts what was given out */
-		return runs->written < runs->n ? &runs->record[runs->written++] : NULL;
+	if (runs->fd < 0) { /* `written` counts what was given out */
+		if (runs->written == runs->n)
+			return NULL;
+		memcpy(&runs->taken, runs->record + runs->written++ * runs->bytes, runs->bytes);
+		return &runs->taken.record;
+	}
 	if (runs->n_heap == 0)
 		return NULL;
 	run = &runs->run[runs->heap[0]];
-	runs->taken = run->record[run->next++];
+	memcpy(&runs->taken, run->record + run->next++ * runs->bytes, runs->bytes);
 	if (run->next == run->n && run->at < run->end)
 		*rc = refill(runs, run, err);
 	if (*rc != PSR_OK)
@@ -214,5 +242,5 @@ const struct record *runs_next(struct runs *runs, int *rc, struct psr_error *err
 		runs->heap[0] = runs->heap[--runs->n_heap];
 	if (runs->n_heap > 0)
 		sink(runs, 0);
-	return &runs->taken;
+	return &runs->taken.record;
 }

@@ -19,15 +19,24 @@ struct record {
 	};
 };
 
+/* A record that is longer by what a scan tells of a point. */
+struct scan_record {
+	struct record record;
+	uint16_t intensity;
+	uint8_t class, returns;
+	uint32_t time;
+};
+
 struct run {
 	uint64_t at, end;   /* of the next bytes in the file, and behind the last ones */
-	struct record *record; /* what has been read: */
+	uint8_t *record;    /* what has been read: */
 	size_t next, n;
 };
 
 struct runs {
 	const char *folder;
-	struct record *record, *spare; /* room for a run each */
+	size_t bytes;      /* of a record: sizeof(struct record), or sizeof(struct scan_record) */
+	uint8_t *record, *spare; /* room for a run each */
 	size_t n, room;
 	int bits;          /* of a path */
 	int fd;            /* of a file without a name; -1: all records are in memory */
@@ -35,13 +44,14 @@ struct runs {
 	struct run *run;
 	uint32_t *heap;    /* of runs that have records left, the least path first */
 	size_t n_runs, n_heap, runs_room, run_room; /* run_room: records of a run that are in memory while merging */
-	struct record taken;
+	struct scan_record taken;
 };
 
-/* Takes `memory` bytes for records. MEMORY. */
-int runs_init(struct runs *runs, const char *folder, int bits, uint64_t memory, struct psr_error *err);
+/* Takes `memory` bytes for records, which are longer ones if is_scan. MEMORY. */
+int runs_init(struct runs *runs, const char *folder, int bits, int is_scan, uint64_t memory, struct psr_error *err);
 void runs_fini(struct runs *runs);
 
+/* Copies a record of `bytes`. */
 int runs_put(struct runs *runs, const struct record *record, struct psr_error *err); /* IO, MEMORY */
 
 /* Ends the putting. IO, MEMORY. */

@@ -132,7 +132,7 @@ int octree_surface_walk(const struct octree_surface *surface, int levels, const 
 	if (levels < OCTREE_LEAST_LEVELS || levels > OCTREE_MOST_LEVELS)
 		return psr_fail(err, PSR_ERR_ARG, "an octree of %d levels; %d to %d are possible", levels, OCTREE_LEAST_LEVELS,
 		                OCTREE_MOST_LEVELS);
-	rc = runs_init(&m.runs, room->folder, 3 * levels, room->memory, err);
+	rc = runs_init(&m.runs, room->folder, 3 * levels, 0, room->memory, err);
 	for (uint32_t i = 0; i < surface->n_triangles && rc == PSR_OK; i++) {
 		m.triangle = i;
 		rc = i % 1024 == 0 && psr_is_cancelled(surface->cancel) ? psr_fail(err, PSR_ERR_CANCELLED, "cancelled")

@@ -344,6 +344,43 @@ static void a_source_gives_the_points_of_the_mesh_and_gives_them_again(void **st
 			}
 }
 
+/* LAS 1.4, tables 7 to 17: where each point format has them. */
+static void a_source_tells_intensity_return_class_and_time(void **state)
+{
+	static const int time_of[11] = { 0, 20, 0, 20, 20, 20, 22, 22, 22, 22, 22 };
+
+	(void)state;
+	for (unsigned format = 0; format < 11; format++) {
+		struct octree_source source;
+		struct octree_point point[4];
+		struct file f;
+		size_t n;
+
+		make(&f, 4, format, 3);
+		put(&f, 107, 4, 3);
+		for (unsigned i = 0; i < 3; i++) {
+			const size_t p = point_at(&f, i);
+
+			put(&f, p + 14, 1, format >= 6 ? 0x90 + i : 0x80 | 5 << 3 | (i + 1)); /* of 9; of 5, at the end of a line */
+			put(&f, p + (format >= 6 ? 16 : 15), 1, format >= 6 ? 64 + i : 0x20 | (3 + i)); /* synthetic */
+			if (time_of[format] > 0)
+				put_double(&f, p + (size_t)time_of[format], 1e9 + 0.25 * i);
+		}
+		assert_int_equal(open_source(&source, &f, f.n, NULL), PSR_OK);
+		assert_int_equal(source.scan, time_of[format] > 0 ? 15 : 7);
+		assert_int_equal(source.rewind(source.userdata, NULL), PSR_OK);
+		assert_int_equal(source.read(&n, point, 4, source.userdata, NULL), PSR_OK);
+		assert_int_equal(n, 3);
+		for (unsigned i = 0; i < 3; i++) {
+			assert_int_equal(point[i].intensity, 100 * i);
+			assert_int_equal(point[i].returns, format >= 6 ? 0x90 + i : 0x50 + i + 1);
+			assert_int_equal(point[i].class, format >= 6 ? 64 + i : 3 + i);
+			assert_true(point[i].time == (time_of[format] > 0 ? 1e9 + 0.25 * i : 0.0));
+		}
+		las_source_close(&source);
+	}
+}
+
 static void a_source_that_is_cut_short_is_refused(void **state)
 {
 	struct octree_source source;
@@ -373,6 +410,7 @@ int main(void)
 		cmocka_unit_test(cut_files_are_refused_at_every_length),
 		cmocka_unit_test(coordinates_that_overflow_are_left_out),
 		cmocka_unit_test(a_source_gives_the_points_of_the_mesh_and_gives_them_again),
+		cmocka_unit_test(a_source_tells_intensity_return_class_and_time),
 		cmocka_unit_test(a_source_that_is_cut_short_is_refused),
 	};
 

@@ -32,11 +32,22 @@ static int setup(void **state)
 	tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
 	tree->offset = malloc(tree->n_leaves);
 	tree->color = malloc(tree->n_leaves * sizeof *tree->color);
+	tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity);
+	tree->scan.class = malloc(tree->n_leaves);
+	tree->scan.returns = malloc(tree->n_leaves);
+	tree->scan.time = malloc(tree->n_leaves * sizeof *tree->scan.time);
+	tree->scan.time_scale = malloc(sizeof *tree->scan.time_scale);
+	(*tree->scan.time_scale)[0] = 3e8;
+	(*tree->scan.time_scale)[1] = 1e-5;
 	for (uint64_t i = 0; i < tree->n_leaves; i++) {
 		tree->normal[i] = (uint16_t)(fixture_random(&random) & 0x7fff);
 		tree->offset[i] = (uint8_t)(fixture_random(&random) % OCTREE_OFFSETS);
 		for (int c = 0; c < 3; c++)
 			tree->color[i][c] = (uint8_t)fixture_random(&random);
+		tree->scan.intensity[i] = (uint16_t)fixture_random(&random);
+		tree->scan.class[i] = (uint8_t)fixture_random(&random);
+		tree->scan.returns[i] = (uint8_t)fixture_random(&random);
+		tree->scan.time[i] = (uint32_t)fixture_random(&random);
 	}
 	assert_int_equal(psr_model_create_octree(&alone, &fixture.info, tree, &fixture.presets, NULL), PSR_OK);
 	assert_int_equal(psr_model_create_both(&both, &fixture.info, &fixture.blocks, tree, NULL, NULL), PSR_OK);
@@ -66,6 +77,11 @@ static void assert_tree(const struct octree *t)
 	assert_memory_equal(t->normal, tree->normal, tree->n_leaves * sizeof *tree->normal);
 	assert_memory_equal(t->offset, tree->offset, tree->n_leaves);
 	assert_memory_equal(t->color, tree->color, tree->n_leaves * sizeof *tree->color);
+	assert_memory_equal(t->scan.intensity, tree->scan.intensity, tree->n_leaves * sizeof *tree->scan.intensity);
+	assert_memory_equal(t->scan.class, tree->scan.class, tree->n_leaves);
+	assert_memory_equal(t->scan.returns, tree->scan.returns, tree->n_leaves);
+	assert_memory_equal(t->scan.time, tree->scan.time, tree->n_leaves * sizeof *tree->scan.time);
+	assert_memory_equal(t->scan.time_scale, tree->scan.time_scale, sizeof *tree->scan.time_scale);
 	assert_int_equal(octree_check(t, NULL, NULL), PSR_OK);
 }
 
@@ -160,10 +176,12 @@ static void attributes_may_be_missing(void **state)
 	bare.normal = NULL;
 	bare.offset = NULL;
 	bare.color = NULL;
+	bare.scan = (struct octree_scan){ NULL };
 	assert_int_equal(psr_model_create_octree(&model, &fixture.info, &bare, NULL, NULL), PSR_OK);
 	assert_null(psr_model_octree(model)->normal);
 	assert_null(psr_model_octree(model)->offset);
 	assert_null(psr_model_octree(model)->color);
+	assert_null(psr_model_octree(model)->scan.intensity);
 	psr_model_unref(model);
 }
 
@@ -244,6 +262,9 @@ static void lies_in_sections_of_octrees_are_refused(void **state)
 		{ "OSKP", 32, 8, UINT64_MAX, PSR_ERR_FORMAT, "skip index does not fit its codes" },
 		{ "ONRM", 20, 2, 32768, PSR_ERR_FORMAT, "section ONRM: the normal of leaf 10 is 32768" },
 		{ "OOFF", 11, 1, OCTREE_OFFSETS, PSR_ERR_FORMAT, "section OOFF: the offset of leaf 11 is 4" },
+		{ "OTSC", 0, 8, 0x7ff8000000000000u, PSR_ERR_FORMAT, "section OTSC: times from nan" },
+		{ "OTSC", 8, 8, 0xbff0000000000000u, PSR_ERR_FORMAT, "section OTSC: times from 3e+08 in steps of -1" },
+		{ "OTSC", 8, 8, 0x7fe0000000000000u, PSR_ERR_FORMAT, "section OTSC: times from" },
 	};
 
 	(void)state;
@@ -265,21 +286,21 @@ static void lies_in_sections_of_octrees_are_refused(void **state)
 
 static void a_set_of_sections_is_whole(void **state)
 {
-	static const char types[6][5] = { "OCTR", "OSKP", "OCOD", "ONRM", "OOFF", "OCOL" };
+	static const char types[][5] = { "OCTR", "OSKP", "OCOD", "OTIM", "OTSC", "ONRM", "OOFF", "OCOL", "OINT", "OCLS", "ORET" };
 
 	(void)state;
-	for (int i = 0; i < 6; i++)
+	for (int i = 0; i < (int)(sizeof types / sizeof *types); i++)
 		for (int with_blocks = 0; with_blocks < 2; with_blocks++) {
 			struct psr_model *model = NULL;
 			struct psr_error err = { 0 };
 			size_t n;
 			uint8_t *copy = copy_of(with_blocks ? both : alone, &n);
-			const int expected = i > 2 ? PSR_OK : i == 0 && !with_blocks ? PSR_ERR_UNSUPPORTED : PSR_ERR_FORMAT;
+			const int expected = i > 4 ? PSR_OK : i == 0 && !with_blocks ? PSR_ERR_UNSUPPORTED : PSR_ERR_FORMAT;
 
 			memcpy(entry_of(copy, types[i]), "GONE", 4);
 			file_seal(copy, n);
 			assert_int_equal(psr_model_parse(&model, copy, n, &err), expected);
-			if (i > 0 && i <= 2)
+			if (i > 0 && i <= 4)
 				assert_non_null(strstr(err.text, types[i]));
 			else if (i == 0)
 				assert_non_null(strstr(err.text, with_blocks ? "OCTR, which tells its length, is missing" : "none of the sections"));
@@ -302,7 +323,7 @@ static void sections_of_octrees_are_not_required(void **state)
 			assert_int_equal(file_get(entry + ENTRY_FLAGS, 2), 0);
 	}
 	assert_int_equal(file_get(copy + HEADER_MAJOR, 2), 6);
-	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 1);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 3);
 	free(copy);
 }
 

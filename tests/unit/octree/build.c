@@ -22,6 +22,7 @@ struct cloud {
 	uint64_t n, next;
 	void (*make)(struct octree_point *point, uint64_t i);
 	int has_normal;
+	unsigned scan;
 };
 
 static int go_back(void *userdata, struct psr_error *err)
@@ -50,15 +51,16 @@ static void on_sphere(struct octree_point *point, uint64_t i)
 	uint64_t random = i;
 	const double z = random_in(&random, -1.0, 1.0), r = sqrt(1.0 - z * z), a = random_in(&random, 0.0, 2.0 * PI);
 
-	*point = (struct octree_point){ { middle[0] + RADIUS * r * cos(a), middle[1] + RADIUS * r * sin(a),
-		                              middle[2] + RADIUS * z },
-		                            { (uint8_t)(127.0 + 127.0 * z), 10, 20 },
-		                            { (float)(r * cos(a)), (float)(r * sin(a)), (float)z } };
+	*point = (struct octree_point){ .at = { middle[0] + RADIUS * r * cos(a), middle[1] + RADIUS * r * sin(a),
+		                                    middle[2] + RADIUS * z },
+		                            .color = { (uint8_t)(127.0 + 127.0 * z), 10, 20 },
+		                            .normal = { (float)(r * cos(a)), (float)(r * sin(a)), (float)z } };
 }
 
 static int build(struct octree **tree, struct cloud *cloud, int levels, uint64_t memory, struct psr_error *err)
 {
 	const struct octree_source source = { .name = "cloud", .has_color = 1, .has_normal = cloud->has_normal, .n_points = cloud->n,
+		                               .scan = cloud->scan,
 		                               .rewind = go_back, .read = read_cloud, .userdata = cloud };
 	struct octree_build_options options;
 
@@ -72,7 +74,7 @@ static int build(struct octree **tree, struct cloud *cloud, int levels, uint64_t
 
 static struct octree *sphere(uint64_t n, int levels, uint64_t memory)
 {
-	struct cloud cloud = { n, 0, on_sphere, 0 };
+	struct cloud cloud = { .n = n, .make = on_sphere };
 	struct octree *tree;
 
 	assert_int_equal(build(&tree, &cloud, levels, memory, NULL), PSR_OK);
@@ -175,7 +177,7 @@ static void normals_turn_from_cell_to_cell(void **state)
  * degrees each. */
 static void normals_of_the_source_are_averaged(void **state)
 {
-	struct cloud cloud = { POINTS, 0, on_sphere, 1 };
+	struct cloud cloud = { .n = POINTS, .make = on_sphere, .has_normal = 1 };
 	struct octree *tree;
 	struct sphere_leaves s = { NULL, calloc(1u << 3 * LEVELS, 1), 1.0, 0.0 };
 
@@ -218,7 +220,7 @@ static int count_inward(const struct octree_node *node, void *userdata)
 
 static void leaves_without_normals_get_theirs_from_their_neighbours(void **state)
 {
-	struct cloud cloud = { POINTS, 0, half_with_normals, 1 };
+	struct cloud cloud = { .n = POINTS, .make = half_with_normals, .has_normal = 1 };
 	struct octree *tree;
 	struct sphere_leaves s = { .worst_cosine = 1.0 };
 
@@ -247,7 +249,7 @@ static void runs_on_disk_give_the_tree_of_memory(void **state)
 
 static void twice(struct octree_point *point, uint64_t i)
 {
-	*point = (struct octree_point){ { i < 100 ? 0.1 : 1.0, 0.0, 0.0 }, { i < 50 ? 0 : 100, 0, 7 }, { 0 } };
+	*point = (struct octree_point){ .at = { i < 100 ? 0.1 : 1.0 }, .color = { i < 50 ? 0 : 100, 0, 7 } };
 }
 
 static void colors_of_a_leaf_are_averaged(void **state)
@@ -262,20 +264,89 @@ static void colors_of_a_leaf_are_averaged(void **state)
 	octree_destroy(tree);
 }
 
+/* The first leaf has the first 100 points, the other one the last. */
+static void scanned(struct octree_point *point, uint64_t i)
+{
+	twice(point, i);
+	point->intensity = (uint16_t)(i < 50 ? 10 : i < 100 ? 65535 : 7);
+	point->class = (uint8_t)(i == 0 ? 2 : i < 100 ? 5 : 6);
+	point->returns = (uint8_t)(i == 0 ? 0x31 : i < 100 ? 0x33 : 0x11);
+	point->time = i == 7 ? NAN : 3e8 + 10.0 * (double)i;
+}
+
+static void streams_of_a_scan_are_means_and_first_points(void **state)
+{
+	struct cloud cloud = { .n = 101, .make = scanned, .scan = 15 };
+	struct octree *tree;
+
+	(void)state;
+	assert_int_equal(build(&tree, &cloud, 3, OCTREE_LEAST_MEMORY, NULL), PSR_OK);
+	const struct octree_scan *scan = &tree->scan;
+	assert_int_equal(tree->n_leaves, 2);
+	assert_true(scan->intensity[0] == 32773 && scan->intensity[1] == 7);
+	assert_true(scan->class[0] == 2 && scan->class[1] == 6);
+	assert_true(scan->returns[0] == 0x31 && scan->returns[1] == 0x11);
+	assert_true(scan->time[0] == 0 && scan->time[1] == UINT32_MAX);
+	assert_true((*scan->time_scale)[0] == 3e8 && fabs((*scan->time_scale)[1] * UINT32_MAX - 1000.0) < 1e-6);
+	octree_destroy(tree);
+	/* Only what the source has. */
+	cloud.scan = 1u << OCTREE_CLASS;
+	assert_int_equal(build(&tree, &cloud, 3, OCTREE_LEAST_MEMORY, NULL), PSR_OK);
+	assert_non_null(tree->scan.class);
+	assert_true(tree->scan.intensity == NULL && tree->scan.returns == NULL && tree->scan.time == NULL);
+	octree_destroy(tree);
+	/* twice() leaves zeros. */
+	cloud = (struct cloud){ .n = 101, .make = twice, .scan = 15 };
+	assert_int_equal(build(&tree, &cloud, 3, OCTREE_LEAST_MEMORY, NULL), PSR_OK);
+	assert_true(tree->scan.intensity == NULL && tree->scan.class == NULL && tree->scan.returns == NULL
+	            && tree->scan.time == NULL && tree->scan.time_scale == NULL);
+	octree_destroy(tree);
+}
+
+static void scanned_sphere(struct octree_point *point, uint64_t i)
+{
+	on_sphere(point, i);
+	point->intensity = (uint16_t)(i * 40503);
+	point->class = (uint8_t)(i * 131);
+	point->returns = (uint8_t)(i * 17);
+	point->time = 1e5 + 1e-4 * (double)i;
+}
+
+/* Who is first in a leaf does not depend on where runs end. */
+static void runs_on_disk_keep_the_order_of_a_scan(void **state)
+{
+	struct octree *tree[2];
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		struct cloud cloud = { .n = POINTS, .make = scanned_sphere, .scan = 15 };
+
+		assert_int_equal(build(&tree[i], &cloud, 6, i == 0 ? OCTREE_LEAST_MEMORY : (uint64_t)64 << 20, NULL), PSR_OK);
+	}
+	const uint64_t n = tree[0]->n_leaves;
+	assert_true(n == tree[1]->n_leaves && n < POINTS / 10);
+	assert_memory_equal(tree[0]->scan.intensity, tree[1]->scan.intensity, 2 * n);
+	assert_memory_equal(tree[0]->scan.class, tree[1]->scan.class, n);
+	assert_memory_equal(tree[0]->scan.returns, tree[1]->scan.returns, n);
+	assert_memory_equal(tree[0]->scan.time, tree[1]->scan.time, 4 * n);
+	octree_destroy(tree[0]);
+	octree_destroy(tree[1]);
+}
+
 static void at_one_place(struct octree_point *point, uint64_t i)
 {
 	(void)i;
-	*point = (struct octree_point){ { 1.0, 2.0, 3.0 }, { 0, 0, 0 }, { 0 } };
+	*point = (struct octree_point){ .at = { 1.0, 2.0, 3.0 } };
 }
 
 static void no_number(struct octree_point *point, uint64_t i)
 {
-	*point = (struct octree_point){ { (double)i, i == 9 ? NAN : 1.0, 3.0 }, { 0, 0, 0 }, { 0 } };
+	*point = (struct octree_point){ .at = { (double)i, i == 9 ? NAN : 1.0, 3.0 } };
 }
 
 static void very_far(struct octree_point *point, uint64_t i)
 {
-	*point = (struct octree_point){ { i == 0 ? -1.7e308 : 1.7e308, 0.0, 0.0 }, { 0, 0, 0 }, { 0 } };
+	*point = (struct octree_point){ .at = { i == 0 ? -1.7e308 : 1.7e308 } };
 }
 
 static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
@@ -386,6 +457,8 @@ int main(void)
 		cmocka_unit_test(leaves_without_normals_get_theirs_from_their_neighbours),
 		cmocka_unit_test(runs_on_disk_give_the_tree_of_memory),
 		cmocka_unit_test(colors_of_a_leaf_are_averaged),
+		cmocka_unit_test(streams_of_a_scan_are_means_and_first_points),
+		cmocka_unit_test(runs_on_disk_keep_the_order_of_a_scan),
 		cmocka_unit_test(bad_clouds_get_an_error_that_names_what_is_wrong),
 		cmocka_unit_test(a_full_disk_leaves_no_file),
 		cmocka_unit_test(a_build_can_be_cancelled_at_any_time),
