@@ -254,6 +254,7 @@ FIRST      := $(BUILD)/tests/bench/first
 TRUTH      := $(BUILD)/tests/bench/truth
 BUDGET     := $(BUILD)/tests/bench/budget
 LARGE      := $(BUILD)/tests/bench/large
+LARGE_OCTREE := $(BUILD)/tests/bench/large_octree
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
@@ -354,6 +355,8 @@ $(BUDGET): $(BUDGET_O) $(CODEC_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(L
 	$(link) -lcjson $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 $(LARGE): $(BUILD)/tests/bench/large.c.o $(HARD_O) $(LIB)/libpsr.a
 	$(link) -lcmocka $(L_PSR)
+$(LARGE_OCTREE): $(BUILD)/tests/bench/large_octree.c.o $(LIB)/libpsr.a
+	$(link) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
@@ -439,8 +442,9 @@ bench-truth: compile $(TRUTH) ## bench-truth: how near frames come to the truth 
 bench-view: compile $(VIEW_BENCH) $(BUILD)/tests/tools/relay ## bench-view: frames a second, latency and time until sharp of a viewer's link, by network
 	$(Q)$(VIEW_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd $(BUILD)/tests/tools/relay
 
-hard-large: $(LARGE) ## hard-large: a model of 100 million samples: memory and times of frames beside bounds (4 GB of memory)
+hard-large: $(LARGE) $(LARGE_OCTREE) ## hard-large: a model of 100 million samples, a cloud of 200 million points: times and memory beside bounds (4 GB of memory, 4 GB in TMPDIR)
 	$(Q)$(LARGE)
+	$(Q)$(LARGE_OCTREE)
 
 bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock beside stamps of a relay and psrd's reports, of the same runs
 	$(Q)BUILD=$(BUILD) tests/bench/load.sh
