@@ -282,13 +282,6 @@ static int check_octree(const struct wish *wish, struct psr_error *err)
 	return PSR_OK;
 }
 
-static int check_progress_fd(int64_t fd, struct psr_error *err)
-{
-	if (fd >= 0 && fcntl((int)fd, F_GETFD) < 0)
-		return psr_fail(err, PSR_ERR_ARG, "--progress-fd: descriptor %" PRId64 " is not open", fd);
-	return PSR_OK;
-}
-
 int cmd_build(int argc, char **argv)
 {
 	struct wish wish = { 0 };
@@ -335,8 +328,7 @@ int cmd_build(int argc, char **argv)
 		  .help = "Memory to sort points in; more of them are sorted on disk, in TMPDIR. The octree comes on top.",
 		  .min = OCTREE_LEAST_MEMORY, .max = 0x1p50 },
 		{ .name = "scan", .type = PSR_OPT_FLAG, .value = &wish.octree.with_scan,
-		  .help = "Keeps what LAS tells of points beside places and colours: intensity, class, return, GPS time. Up to 8 bytes"
-		          " more a leaf, and half as much again to sort." },
+		  .help = "Keeps what LAS tells of points besides: intensity, class, return, GPS time; up to 8 bytes more a leaf." },
 		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
@@ -377,8 +369,8 @@ int cmd_build(int argc, char **argv)
 		code = check_octree(&wish, &err);
 	if (code == PSR_OK)
 		code = check_calibration(&wish, &err);
-	if (code == PSR_OK)
-		code = check_progress_fd(fd, &err);
+	if (code == PSR_OK && fd >= 0 && fcntl((int)fd, F_GETFD) < 0)
+		code = psr_fail(&err, PSR_ERR_ARG, "--progress-fd: descriptor %" PRId64 " is not open", fd);
 	if (code != PSR_OK)
 		return psr_cli_fail(PROGRAM, &err);
 	wish.build.resolution = (uint32_t)resolution;

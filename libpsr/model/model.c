@@ -218,6 +218,7 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 {
 	const char *name = short_name(path);
 	struct found f;
+	uint64_t cubes;
 	int code = open_file(&f, path, name, err);
 
 	if (code != PSR_OK)
@@ -229,9 +230,11 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; the limit is "
 		                "%d to 1", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
 	}
-	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model)
-	           + model_cubes_need(&(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = name }, f.is_packed);
+	cubes = model_cubes_need(&(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = name }, f.is_packed);
 	close(f.fd);
+	if (f.is_packed && f.n_whole > f.n_bytes && cubes > 2 * f.n_image)
+		cubes = 2 * f.n_image; /* OCTR counts the whole tree */
+	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model) + cubes;
 	return PSR_OK;
 }
 

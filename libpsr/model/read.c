@@ -139,9 +139,9 @@ static void hash_chunk(int i, void *userdata)
 	struct hashing *h = userdata;
 	const uint64_t k = (uint64_t)i, first = k * FILE_CHUNK_BYTES, left = h->length - first;
 	const uint64_t hash = XXH64(h->section + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0);
-	uint64_t first_bad = atomic_load(&h->first_bad);
+	uint64_t bad = hash == file_get(h->hashes + 8 * k, 8) ? 0 : atomic_load(&h->first_bad); /* 0: not this one */
 
-	while (hash != file_get(h->hashes + 8 * k, 8) && k < first_bad && !atomic_compare_exchange_weak(&h->first_bad, &first_bad, k))
+	while (k < bad && !atomic_compare_exchange_weak(&h->first_bad, &bad, k))
 		;
 }
 

@@ -2,6 +2,7 @@
 #include <string.h>
 #include "cache.h"
 #include "residence.h"
+#include "model/cubes.h"
 #include "server/log.h"
 
 #define MAX_TRIES 4 /* the first model may leave again before the last one is there */
@@ -93,6 +94,11 @@ static void read_job(void *userdata)
 			coming->read = NULL;
 			coming->code = PSR_ERR_NOT_FOUND;
 		}
+	}
+	/* Its bytes were counted with them. */
+	if (coming->code == PSR_OK && (coming->code = psr_model_make_cubes(coming->read, &coming->error)) != PSR_OK) {
+		psr_model_unref(coming->read);
+		coming->read = NULL;
 	}
 	if (coming->code == PSR_OK && coming->model->key[0] != '\0')
 		cache_touch(coming->path);

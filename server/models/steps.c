@@ -168,6 +168,7 @@ static void on_built(const struct psr_error *failure, void *userdata)
 	} else {
 		o->was_built = 1;
 		o->bytes = (uint64_t)status.st_size;
+		psr_model_need(&o->bytes, o->temporary, NULL); /* if that fails the size stays, and loading says what is wrong */
 		list_in_use(o);
 		load(o);
 	}

@@ -56,7 +56,8 @@ is "with --scan it keeps the classes of the cloud, and no stream of zeros" \
 psr-model build "$work/ball.las" --representation octree --levels 7 --scan --pack -q -o "$work/scan.psr"
 is "and so it does packed" "$(value "$work/scan.json" content_id)" \
 	"$(psr-model info "$work/scan.psr" --json >"$work/scan.json"; value "$work/scan.json" content_id)"
-refuses "a scan of blocks" 2 "add --representation octree" psr-model build "$work/ball.las" --scan -o "$work/none.psr"
+refuses "a scan of blocks" 2 "add --representation octree" psr-model build "$work/ball.las" \
+	--representation blocks --scan -o "$work/none.psr"
 
 psr-model build "$work/ball.las" --representation octree --levels 7 --memory 1m -q -o "$work/runs.psr"
 is "sorting on disk makes the same file" "$(sha256sum <"$work/ball.psr")" "$(sha256sum <"$work/runs.psr")"
