@@ -250,11 +250,14 @@ int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scen
 		if (scene->light[i].flags & PSR_WIRE_LIGHT_SHADOW && !(client->welcome.capabilities & PSR_CAP_SHADOWS))
 			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no shadows (%s); leave `shadow` out", client->address,
 			                client->welcome.server);
-	for (unsigned i = 0; code == PSR_OK && i < scene->n_instances && i < PSR_WIRE_MAX_INSTANCES; i++)
-		if (scene->instance[i].representation == PSR_WIRE_REP_OCTREE
-		    && !(client->welcome.capabilities & PSR_CAP_OCTREE))
-			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no octrees (%s)", client->address,
-			                client->welcome.server);
+	for (unsigned i = 0; code == PSR_OK && i < scene->n_instances && i < PSR_WIRE_MAX_INSTANCES; i++) {
+		const unsigned kind = scene->instance[i].representation;
+		const uint32_t needs = kind == PSR_WIRE_REP_OCTREE ? PSR_CAP_OCTREE : kind == PSR_WIRE_REP_DPOINT ? PSR_CAP_DPOINT : 0;
+
+		if ((client->welcome.capabilities & needs) != needs)
+			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no %s (%s)", client->address,
+			                kind == PSR_WIRE_REP_OCTREE ? "octrees" : "differential points", client->welcome.server);
+	}
 	if (code != PSR_OK)
 		return code;
 	if (id != NULL)

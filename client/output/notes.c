@@ -172,7 +172,7 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 		        notes->least_pass, asked->pass_limit);
 	if (notes->n_over > 0 && notes->n_pictures > 1)
 		fprintf(stderr, "%s: %u of %u pictures are over the budget\n", program, notes->n_over, notes->n_pictures);
-	if (model != NULL && notes->coarsest > ROUGH && asked->settings.spacing_px < DRAFT) {
+	if (model != NULL && model->opened.representations != 1u << PSR_WIRE_REP_DPOINT && notes->coarsest > ROUGH && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
 		if (!(model->opened.representations >> PSR_WIRE_REP_BLOCKS & 1))

@@ -5,7 +5,7 @@
 #include "base/vec.h"
 #include "base/cli.h"
 
-#define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S][,as=blocks|octree]"
+#define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S][,as=blocks|octree|dpoints]"
 
 /* Rotation a, then b: the quaternion b a. */
 static void compose(double out[4], const double a[4], const double b[4])
@@ -54,8 +54,10 @@ static int parse_representation(struct psr_msg_instance *place, const char *text
 		place->representation = PSR_WIRE_REP_BLOCKS;
 	else if (n == 6 && memcmp(text, "octree", 6) == 0)
 		place->representation = PSR_WIRE_REP_OCTREE;
+	else if (n == 7 && memcmp(text, "dpoints", 7) == 0)
+		place->representation = PSR_WIRE_REP_DPOINT;
 	else
-		return psr_fail(err, PSR_ERR_ARG, "as is blocks or octree, not '%.40s'; without it the server chooses", text);
+		return psr_fail(err, PSR_ERR_ARG, "as is blocks, octree or dpoints, not '%.40s'; without it the server chooses", text);
 	return PSR_OK;
 }
 

@@ -11,7 +11,7 @@ struct instance_wish {
 	uint32_t pixels; /* for psr_client_set_resolution(); 0: as the scene */
 };
 
-/* Reads NAME[,at=X,Y,Z][,scale=S][,as=blocks|octree][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z. Rotations apply
+/* Reads NAME[,at=X,Y,Z][,scale=S][,as=blocks|octree|dpoints][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z. Rotations apply
  * in their order, about the model's own 0,0,0, which `at` then places. ARG. */
 int instance_parse(struct instance_wish *wish, const char *text, struct psr_error *err);
 

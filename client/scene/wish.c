@@ -96,8 +96,8 @@ static void add_instances(struct optlist *list, struct scene_wish *wish)
 		  .call = on_instance, .seen = &wish->n_said,
 		  .words = "@models",
 		  .help = "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of "
-		          "its file, S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it. KIND: blocks or "
-		          "octree, of a model that has both; without it blocks are drawn." },
+		          "its file, S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it. KIND: blocks, "
+		          "octree or dpoints, of a model that has several; without it the first of these is drawn." },
 	};
 
 	OPTLIST_ADD(list, opts);

@@ -42,11 +42,15 @@ enum dpoint_made dpoint_make(struct dpoint *out, const struct dpoint_local *loca
 /* ---- 16 bytes ---- */
 
 struct dpoint_word {
-	uint64_t place; /* from bit 0: x, y, z (14 each), angle of u (7), lambda_u (8: sign in the highest), rho (7) */
+	/* From bit 0: x, y, z (12 each), two steps from the attributes' normal (3 each), angle of u (7), lambda_u (8: sign in
+	 * the highest), rho (7). */
+	uint64_t place;
 	uint64_t attr;
 };
 
-#define DPOINT_PLACE_STEPS 16383
+#define DPOINT_PLACE_STEPS 4095
+#define DPOINT_FINE_STEP 0.00553f     /* of a normal along each tangent: eight of them reach over a triangle of normals */
+#define DPOINT_FINE_MIDDLE 3.5f
 #define DPOINT_LAMBDA_STEPS 6         /* an octave */
 #define DPOINT_LEAST_LAMBDA 0x1p-5    /* codes 1 to 127 reach from one to the other, 0 is 0 */
 #define DPOINT_MOST_LAMBDA 0x1p16
@@ -61,9 +65,9 @@ struct dpoint_box {
 /* Makes a box that reaches from low to high at least; low <= high, finite, below 2^10 in magnitude. */
 void dpoint_box_make(struct dpoint_box *box, const float low[3], const float high[3]);
 
-/* Packs a point to the nearest word. What dpoint_unpack() then gives differs from it by at most:
+/* Packs a point to the nearest word; to the same one if it was unpacked, and its attributes' normal was left alone. What dpoint_unpack() then gives differs from it by at most:
  *   place       half a step of the box and 2^-22 of its greatest coordinate, on each axis; it is inside of the box
- *   normal      the radius of its triangle (base/direction.h)
+ *   normal      half a step along each tangent, 0.23 degrees in all
  *   direction   pi / 256 around the normal, after it was brought to the tangent plane of the new one
  *   lambda_u    a factor of 2^(1/12), or DPOINT_LEAST_LAMBDA / 2 where it is below DPOINT_LEAST_LAMBDA
  *   rho         1/126; -1, 0 and 1 stay what they are */
@@ -71,6 +75,49 @@ void dpoint_pack(struct dpoint_word *word, const struct dpoint *point, const str
 
 /* Unpacks any word. */
 void dpoint_unpack(struct dpoint *point, const struct dpoint_word *word, const struct dpoint_box *box);
+
+/* What codes of a word stand for, for kernels that unpack many. */
+enum { DPOINT_PLACE_BITS = 12, DPOINT_FINE_BITS = 3, DPOINT_FINE_AT = 36, DPOINT_ANGLE_AT = 42, DPOINT_LAMBDA_AT = 49, DPOINT_RHO_AT = 57 };
+struct dpoint_tables {
+	float lambda[256];             /* with its sign */
+	float turn[DPOINT_ANGLES][2];  /* cosine and sine of an angle from the first tangent */
+};
+const struct dpoint_tables *dpoint_tables(void);
+
+/* Finds a basis of the tangent plane that is continuous but where z changes its sign (Duff et al., "Building an
+ * Orthonormal Basis, Revisited", 2017): one division. Angles count from x. */
+static inline void dpoint_tangents(float x[3], float y[3], const float n[3])
+{
+	const float sign = psr_choose(n[2] < 0, -1, 1);
+	const float a = -1.0f / (sign + n[2]), b = n[0] * n[1] * a;
+
+	x[0] = 1.0f + sign * n[0] * n[0] * a;
+	x[1] = sign * b;
+	x[2] = -sign * n[0];
+	y[0] = b;
+	y[1] = sign + n[1] * n[1] * a;
+	y[2] = -n[1];
+}
+
+/* Computes the normal that is `fine` steps from a triangle's centre, of unit length. */
+static inline void dpoint_fine_normal(float n[3], const float center[3], const float fine[2])
+{
+	const float unit = 1 / sqrtf(1 + (fine[0] * fine[0] + fine[1] * fine[1]));
+	float x[3], y[3];
+
+	dpoint_tangents(x, y, center);
+	for (int k = 0; k < 3; k++)
+		n[k] = (center[k] + (fine[0] * x[k] + fine[1] * y[k])) * unit;
+}
+
+static inline void dpoint_fine_of(float fine[2], uint64_t place)
+{
+	for (int k = 0; k < 2; k++) {
+		const int32_t code = (int32_t)(place >> (DPOINT_FINE_AT + k * DPOINT_FINE_BITS) & 7);
+
+		fine[k] = ((float)code - DPOINT_FINE_MIDDLE) * DPOINT_FINE_STEP;
+	}
+}
 
 /* Returns whether dpoint_pack() could have written the word. */
 int dpoint_word_is_valid(const struct dpoint_word *word);

@@ -6,7 +6,7 @@
 #include "surface.h"
 
 #define DPOINT_GROUP 64
-#define DPOINT_MOST_BOX 0.6f /* of a side: half a step is below 2e-5, the slack of coverage */
+#define DPOINT_MOST_BOX 0.16f /* of a side: half a step is below 2e-5, the slack of coverage */
 
 enum dpoint_group_flag {
 	DPOINT_TWO_SIDED = 1, /* seen from the back it is shaded with its normals turned; else it is not seen */

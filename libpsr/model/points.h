@@ -21,6 +21,12 @@ struct psr_points {
 int psr_points_create(struct psr_points **out, const struct dpoint_set *set, const char *name, struct psr_error *err);
 void psr_points_destroy(struct psr_points *points); /* NULL is fine */
 
+/* Returns the attributes of a point of a group, with the normal in its middle. */
+static inline uint64_t psr_points_sample(const struct psr_points *points, uint32_t group, uint32_t lane)
+{
+	return points->set->word[points->set->group[group].first + lane].attr;
+}
+
 /* Return NULL if the model has no differential points. */
 const struct psr_points *psr_model_points(const struct psr_model *model);
 const struct dpoint_set *psr_model_point_set(const struct psr_model *model);

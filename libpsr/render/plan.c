@@ -156,6 +156,29 @@ static void cubes_make(struct warp_cubes *out, double to_camera[3][3], const dou
 	}
 }
 
+/* to_camera: to camera space, of an inner unit's length there. turn: the same without its scale. */
+static void points_make(struct warp_points *out, double to_camera[3][3], double turn[3][3], const double center[3],
+                        const struct plan *plan, double focal)
+{
+	const double scale = v3d_length(to_camera[0]);
+
+	out->tables = dpoint_tables();
+	out->direction = psr_direction_table();
+	for (int a = 0; a < 3; a++) {
+		out->origin[a] = (a < 2 ? focal : 1) * center[a];
+		for (int k = 0; k < 3; k++)
+			out->axis[a][k] = (a < 2 ? focal : 1) * to_camera[a][k];
+	}
+	for (int k = 0; k < 3; k++) {
+		out->eye[k] = -(turn[0][k] * center[0] + turn[1][k] * center[1] + turn[2][k] * center[2]) / scale;
+		out->right[k] = (float)(turn[0][k] / (focal * scale));
+		out->down[k] = (float)(turn[1][k] / (focal * scale));
+		out->forward[k] = (float)(turn[2][k] / scale);
+	}
+	out->center[0] = (float)plan->center[0];
+	out->center[1] = (float)plan->center[1];
+}
+
 /* A pixel's line of sight in inner coordinates, of length 1 along the view axis. */
 static void sight_make(struct warp_instance *out, double turn[3][3], const struct plan *plan, double focal)
 {
@@ -175,12 +198,15 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	double world = plan_place(center, rotation, instance, view->eye), scale = world * view->scale;
 	const double blocks_spacing = psr_model_info(instance->model)->spacing * instance->scale * view->scale;
 	const struct psr_cubes *cubes = instance_cubes(instance);
+	const struct psr_points *points = instance_points(instance);
 	const double edge = cubes != NULL ? cubes->level[0].edge * scale : 0;
+	/* Rectangles of points meet: there are no gaps at any distance. */
+	const double spacing = points != NULL ? 0 : cubes != NULL ? CUBES_SPACING * edge : blocks_spacing;
 	struct cull_view *cull = &out->cull;
 
 	*cull = (struct cull_view){
-		.blocks = warp->blocks, .cubes = cubes, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
-		.spacing = (float)ldexp(cubes != NULL ? CUBES_SPACING * edge : blocks_spacing, plan->cell_bias),
+		.blocks = warp->blocks, .cubes = cubes, .points = points, .scale = (float)scale, .perspective = plan->perspective,
+		.focal = plan->focal, .spacing = (float)ldexp(spacing, plan->cell_bias),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
@@ -218,6 +244,8 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 
 	if (cubes != NULL)
 		cubes_make((struct warp_cubes *)warp->cubes, to_camera, camera_center, plan, focal);
+	if (points != NULL)
+		points_make((struct warp_points *)warp->points, to_camera, out->turn, camera_center, plan, focal);
 	struct warp_lattice *const lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
 		lattice_make(&lattice[p], &warp->blocks->projection[p], to_camera, camera_center, plan, focal);
@@ -239,29 +267,38 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 {
 	struct warp_lattice *lattice;
 	struct warp_cubes *to;
-	size_t n_projections = 0, n_octrees = 0;
+	struct warp_points *to_points;
+	size_t n_projections = 0, n_octrees = 0, n_points = 0;
 
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		n_projections += instance_groups(&scene->instance[i])->n_projections;
 		n_octrees += instance_cubes(&scene->instance[i]) != NULL;
+		n_points += instance_points(&scene->instance[i]) != NULL;
 	}
-	const size_t size = n_octrees * sizeof *to + n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light)
+	const size_t size = n_octrees * sizeof *to + n_points * sizeof *to_points + n_projections * sizeof(struct warp_lattice)
+	                    + scene->n_lights * sizeof(struct strip_light)
 	                    + scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
 	plan->storage = psr_grow_huge(plan->storage, &plan->storage_size, size + 1);
 	if (plan->storage == NULL)
 		return PSR_ERR_MEMORY;
 	to = plan->storage;
-	lattice = (struct warp_lattice *)(to + n_octrees);
+	to_points = (struct warp_points *)(to + n_octrees);
+	lattice = (struct warp_lattice *)(to_points + n_points);
 	plan->instance = (struct plan_instance *)(lattice + n_projections);
 	plan->warp = (struct warp_instance *)(plan->instance + scene->n_instances);
 	plan->light = (struct strip_light *)(plan->warp + scene->n_instances);
 	plan->n_slots = plan->n_groups = 0;
 	plan->n_samples = 0;
 	plan->has_octrees = n_octrees > 0;
+	plan->has_points = n_points > 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		const struct psr_blocks *blocks = instance_groups(&scene->instance[i]);
 		const struct psr_cubes *cubes = instance_cubes(&scene->instance[i]);
+		const struct psr_points *points = instance_points(&scene->instance[i]);
 
+		if (points != NULL)
+			to_points->model = points;
+		plan->warp[i].points = points != NULL ? to_points++ : NULL;
 		if (cubes != NULL)
 			to->model = cubes;
 		plan->warp[i].cubes = cubes != NULL ? to++ : NULL;

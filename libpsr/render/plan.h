@@ -44,7 +44,7 @@ struct plan {
 	struct strip_view view;            /* the cull completes `needs` */
 	int has_sheer;                     /* a block in view has opacities; set by the cull, as is the next */
 	int has_thin;                      /* a sheer block in view is of thin things */
-	int has_octrees;                   /* an instance is drawn as one */
+	int has_octrees, has_points;       /* an instance is drawn as one, or as differential points */
 	int caster;                        /* of a shadow map, SHADOW_OPAQUE or a class of glass; of a picture NO_CASTER */
 	struct strip_light *light;
 	/* By light, SHADOW_CASTERS each, or NULL: no shadows; and the share of the light that each caster keeps back. The

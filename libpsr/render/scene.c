@@ -9,9 +9,11 @@
 
 static int validate_instance(const struct psr_instance *instance, unsigned i, struct psr_error *err)
 {
+	static const char *const names[] = { "samples", "blocks", "octree", "differential points" };
+
 	if (instance->model == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "instance %u has no model", i);
-	if ((unsigned)instance->representation > PSR_OCTREE)
+	if ((unsigned)instance->representation > PSR_DPOINTS)
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: there is no representation %d", i, instance->representation);
 	if (is_octree(instance)) {
 		const int rc = psr_model_make_cubes(instance->model, err);
@@ -20,8 +22,7 @@ static int validate_instance(const struct psr_instance *instance, unsigned i, st
 			return rc;
 	}
 	if (instance_groups(instance) == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no %s", i,
-		                instance->representation == PSR_OCTREE ? "octree" : "blocks");
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no %s", i, names[instance->representation]);
 	double q = 0;
 	for (int k = 0; k < 4; k++)
 		q += instance->rotation[k] * instance->rotation[k];

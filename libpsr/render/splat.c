@@ -187,9 +187,11 @@ static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, con
 		struct bin_entry some[256];
 		uint32_t n_some = 0;
 
-		for (; e < n && n_some < sizeof some / sizeof *some; e++, n_some++) {
+		for (; e < n && n_some < sizeof some / sizeof *some; e++) {
+			if (plan->warp[entry[e].instance].points != NULL)
+				continue;
 			some[n_some] = entry[e];
-			some[n_some].level = entry[e].level ? entry[e].level : 1;
+			some[n_some++].level = entry[e].level ? entry[e].level : 1;
 		}
 		n_inside += warp_entries(simd, plan, target, some, n_some);
 	}
@@ -225,6 +227,8 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	for (uint32_t e = begin; e < end && !(e % 8 == 0 && plan_is_cancelled(plan)); e++) {
 		if (plan->warp[bins->entry[e].instance].cubes != NULL)
 			splat_cube(&t, &bins->entry[e]);
+		else if (plan->warp[bins->entry[e].instance].points != NULL)
+			counts.n_inside += simd->warp_points(&target, &bins->entry[e], 1);
 		else
 			draw_block(&t, &bins->entry[e], WORDS);
 	}

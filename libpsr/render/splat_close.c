@@ -65,8 +65,10 @@ static void find_normal(float n[3], const struct splat_picture *s, int64_t x, in
 	const struct shown shown = find_shown(s, x, y);
 	const struct psr_blocks *b = shown.in->cull.blocks;
 	const struct psr_cubes *cubes = shown.in->cull.cubes;
-	const uint64_t attr = cubes != NULL ? psr_cubes_sample(cubes, shown.block, shown.sample)
-	                                    : block_attr(b, shown.block, shown.sample);
+	const struct psr_points *points = shown.in->cull.points;
+	const uint64_t attr = cubes != NULL    ? psr_cubes_sample(cubes, shown.block, shown.sample)
+	                      : points != NULL ? psr_points_sample(points, shown.block, shown.sample)
+	                                       : block_attr(b, shown.block, shown.sample);
 	const float *inner = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
 
 	for (int a = 0; a < 3; a++)

@@ -78,6 +78,11 @@ static uint64_t samples_of(const struct plan_instance *in, const struct psr_clus
 
 	if (in->cull.cubes != NULL)
 		return leaves_of(in->cull.cubes, k);
+	if (in->cull.points != NULL) {
+		const struct dpoint_set *set = in->cull.points->set;
+
+		return (end < set->n_groups ? set->group[end].first : set->n_points) - set->group[k->first_block].first;
+	}
 	return (end < b->n_blocks ? psr_blocks_attr_first(b, end) : b->n_samples)
 	       - psr_blocks_attr_first(b, k->first_block);
 }

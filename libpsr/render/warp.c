@@ -3,7 +3,8 @@
 
 #define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
 
-#define RUN 1024 /* blocks warped between two questions */
+#define RUN 1024     /* blocks warped between two questions */
+#define POINTS_RUN 4 /* groups of points, each of which may cover the tile */
 
 /* The most frequent level above 0 among a tile's blocks; 0 if there is none. */
 static int most_frequent_level(const struct plan *plan, const struct bin_entry *entry, uint32_t n)
@@ -19,19 +20,29 @@ static int most_frequent_level(const struct plan *plan, const struct bin_entry *
 	return most;
 }
 
+static inline warp_fn *kernel_of(const struct simd *simd, const struct plan *plan, const struct bin_entry *entry)
+{
+	const struct warp_instance *in = &plan->warp[entry->instance];
+
+	return in->cubes != NULL ? simd->warp_leaves : in->points != NULL ? simd->warp_points : simd->warp;
+}
+
 uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
                       const struct bin_entry *entry, uint32_t n)
 {
 	uint64_t n_inside = 0;
 
-	if (!plan->has_octrees)
+	if (!plan->has_octrees && !plan->has_points)
 		return simd->warp(target, entry, n);
 	for (uint32_t first = 0, end = 0; first < n; first = end) {
-		const int is_octree = plan->warp[entry[first].instance].cubes != NULL;
+		warp_fn *warp = kernel_of(simd, plan, &entry[first]);
+		const uint32_t most = warp == simd->warp_points ? POINTS_RUN : n;
 
-		while (end < n && (plan->warp[entry[end].instance].cubes != NULL) == is_octree)
+		if (most < n && plan_is_cancelled(plan))
+			break;
+		while (end < n && end - first < most && kernel_of(simd, plan, &entry[end]) == warp)
 			end++;
-		n_inside += (is_octree ? simd->warp_leaves : simd->warp)(target, entry + first, end - first);
+		n_inside += warp(target, entry + first, end - first);
 	}
 	return n_inside;
 }

@@ -9,6 +9,7 @@
 struct cull_view {
 	const struct psr_blocks *blocks;
 	const struct psr_cubes *cubes; /* NULL: blocks are blocks; else they are its groups */
+	const struct psr_points *points; /* likewise */
 	float center_m[3][4]; /* inner coordinates to camera space */
 	float scale;          /* camera space units an inner unit */
 	float spacing;        /* greatest distance of neighbours at level 0, camera space */
@@ -68,7 +69,8 @@ struct cull_batch {
 	int32_t range[CULL_BATCH];     /* of regions: screen_range of x, times SCREEN_RANGES, plus that of y */
 	float near[CULL_BATCH];        /* a lower bound of its samples' z' */
 	float apart[CULL_BATCH];       /* how far neighbouring samples are from each other, in pixels, at most */
-	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels; of a leaf, half its diagonal */
+	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels; of a leaf, half its diagonal; of points,
+	                                * how far they may be off */
 };
 
 /* Culls blocks first .. first + n - 1, n at most CULL_BATCH, by frustum and cone. Cubes are of one level. */

@@ -24,6 +24,7 @@ struct simd {
 	warp_cells_fn *warp_cells;
 	warp_fn *warp;
 	warp_fn *warp_leaves; /* of entries that are cubes; the former's are blocks */
+	warp_fn *warp_points; /* of entries that are groups of differential points: of level 0, without cells */
 	veil_fn *veil;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;

@@ -3,6 +3,7 @@
 #define PSR_SIMD_WARP_H
 
 #include "model/cubes.h"
+#include "model/points.h"
 #include "tile.h"
 #include "zstack.h"
 
@@ -42,9 +43,24 @@ struct warp_cubes {
 	struct warp_octants level[CUBES_MOST_LEVELS];
 };
 
+/* Differential points in a picture. Axis a of a point p of inner coordinates is origin[a] + axis[a] . p: focal times x
+ * and y from where the view axis meets the picture, and z'. */
+struct warp_points {
+	const struct psr_points *model;
+	const struct dpoint_tables *tables;
+	const float (*direction)[3]; /* psr_direction_table() */
+	double origin[3], axis[3][3];
+	double eye[3];               /* inner coordinates */
+	/* The line of sight through a pixel: inner coordinates for a z' of 1, which a pixel to the right or down adds to
+	 * `forward`; orthographic: which a pixel adds to where the line begins. */
+	float right[3], down[3], forward[3];
+	float center[2];             /* pixels: where the view axis meets the picture */
+};
+
 struct warp_instance {
-	const struct psr_blocks *blocks;    /* an octree's groups: those of `cubes` */
-	const struct warp_cubes *cubes;     /* NULL: blocks */
+	const struct psr_blocks *blocks;    /* groups of an octree or of points: those of `cubes` or `points` */
+	const struct warp_cubes *cubes;     /* NULL: no octree */
+	const struct warp_points *points;   /* NULL: no differential points. Both NULL: blocks */
 	const struct warp_lattice *lattice; /* one a projection */
 	uint32_t first_slot;
 	/* The direction of sight through (u, v), in inner coordinates: u du + v dv + d0, of any length. */

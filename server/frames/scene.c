@@ -120,30 +120,37 @@ static uint32_t add_model(struct scene *scene, struct catalogue_model *model)
 	return i;
 }
 
+static int is_one(uint32_t representations)
+{
+	return (representations & (representations - 1)) == 0;
+}
+
+static const char *lowest_name(const char *const names[], uint32_t representations)
+{
+	return names[__builtin_ctz(representations)];
+}
+
 static int add_instance(struct scene *scene, const struct handles *handles, const struct psr_msg_instance *msg,
                         struct psr_error *err)
 {
 	struct catalogue_model *model = handles_find(handles, msg->handle);
 	uint32_t number = scene->scene.n_instances;
 	struct psr_instance *instance = &scene->instance[number];
-	static const char *const names[] = { "", "blocks", "an octree" };
+	static const char *const names[] = { "", "blocks", "an octree", "differential points" };
 	static const enum psr_representation representations[] = {
 		[PSR_WIRE_REP_AUTO] = PSR_AUTOMATIC, [PSR_WIRE_REP_BLOCKS] = PSR_BLOCKS, [PSR_WIRE_REP_OCTREE] = PSR_OCTREE,
+		[PSR_WIRE_REP_DPOINT] = PSR_DPOINTS,
 	};
 	double norm = 0;
 
-	if (msg->representation > PSR_WIRE_REP_OCTREE)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "instance %" PRIu32 " asks for representation %u; this server draws blocks and octrees "
-		                "(1 and 2, or 0 for automatic)",
-		                number, msg->representation);
 	if (model == NULL)
 		return psr_fail(err, PSR_ERR_NOT_FOUND,
 		                "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it", number, msg->handle);
 	if (msg->representation != PSR_WIRE_REP_AUTO && !(model->card.representations >> msg->representation & 1))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "instance %" PRIu32 " asks for representation %u (%s), and its model has %s alone", number,
-		                msg->representation, names[msg->representation], names[3 - msg->representation]);
+		                "instance %" PRIu32 " asks for representation %u (%s), and its model has %s%s", number,
+		                msg->representation, names[msg->representation], lowest_name(names, model->card.representations),
+		                is_one(model->card.representations) ? " alone" : " and others");
 	instance->representation = representations[msg->representation];
 	for (int k = 0; k < 4; k++)
 		norm += msg->rotation[k] * msg->rotation[k];

@@ -3,6 +3,7 @@
 #include "card.h"
 #include "model/calibration.h"
 #include "model/cubes.h"
+#include "model/points.h"
 #include "psr/message.h"
 
 /* Returns NULL for no presets, or without memory. */
@@ -19,10 +20,11 @@ int card_init(struct card *card, const struct psr_model *model)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(model), *drawn = blocks;
 	const struct psr_cubes *cubes = psr_model_cubes(model);
+	const struct psr_points *points = psr_model_points(model);
 	const struct psr_presets *presets = psr_model_presets(model);
 
 	if (blocks == NULL)
-		drawn = &cubes->groups;
+		drawn = cubes != NULL ? &cubes->groups : &points->groups;
 	*card = (struct card){ .info = *psr_model_info(model), .presets = *presets, .n_levels = drawn->n_levels,
 		                   .n_samples = drawn->n_samples, .has_sheer = blocks != NULL && blocks->opacity != NULL,
 		                   .is_calibrated = psr_model_calibration(model)->n > 0 };
@@ -33,6 +35,10 @@ int card_init(struct card *card, const struct psr_model *model)
 	if (cubes != NULL) {
 		card->representations |= 1u << PSR_WIRE_REP_OCTREE;
 		card->n_cubes = cubes->groups.n_blocks;
+	}
+	if (points != NULL) {
+		card->representations |= 1u << PSR_WIRE_REP_DPOINT;
+		card->n_points = points->groups.n_blocks;
 	}
 	psr_model_content_id(model, card->content_id);
 	card->presets.camera = copy(presets->camera, presets->n_cameras, sizeof *presets->camera);

@@ -12,7 +12,7 @@ struct card {
 	struct psr_presets presets; /* freed by the card */
 	uint32_t representations; /* bit r: enum psr_wire_rep r */
 	uint32_t n_levels;        /* these of what is drawn where nobody names a representation */
-	uint32_t n_blocks, n_cubes; /* of blocks, of the octree; 0 without */
+	uint32_t n_blocks, n_cubes, n_points; /* of blocks, of the octree, groups of differential points; 0 without */
 	uint64_t n_samples;
 	int has_sheer; /* some samples let a part of the light through */
 	int is_calibrated; /* its blocks' ladder is measured (model/calibration.h) */
@@ -22,12 +22,12 @@ struct card {
 int card_init(struct card *card, const struct psr_model *model);
 void card_fini(struct card *card);
 
-/* Returns how many blocks or cubes of this representation a model has, at all levels. */
+/* Returns how many blocks, cubes or groups of this representation a model has, at all levels. */
 static inline uint32_t card_groups(const struct card *card, enum psr_representation representation)
 {
-	const int is_octree = representation == PSR_OCTREE || (representation == PSR_AUTOMATIC && card->n_blocks == 0);
-
-	return is_octree ? card->n_cubes : card->n_blocks;
+	if (representation == PSR_AUTOMATIC)
+		return card->n_blocks > 0 ? card->n_blocks : card->n_cubes > 0 ? card->n_cubes : card->n_points;
+	return representation == PSR_DPOINTS ? card->n_points : representation == PSR_OCTREE ? card->n_cubes : card->n_blocks;
 }
 
 #endif

@@ -7,6 +7,7 @@ static void random_view(struct check *c, struct cull_view *view, const struct ps
 {
 	view->blocks = blocks;
 	view->cubes = NULL;
+	view->points = NULL;
 	view->scale = check_plain_or_any(c, is_spoilt, 0, 1);
 	view->spacing = check_plain_or_any(c, is_spoilt, 0, 0.01);
 	view->perspective = (int)check_below(c, 2);

@@ -76,6 +76,7 @@ static void random_instance(struct check *c, struct warp_instance *in, const str
 	}
 	in->blocks = blocks;
 	in->cubes = NULL;
+	in->points = NULL;
 	in->lattice = lattice;
 	for (int k = 0; k < 9; k++)
 		in->turn[k / 3][k % 3] = check_plain_or_any(c, is_spoilt, -1, 1);

@@ -18,8 +18,8 @@ extern "C" {
 #define PSR_MAX_INSTANCES 1024
 #define PSR_MAX_LIGHTS 32
 
-/* How a model is drawn. Automatic: as blocks if it has any. */
-enum psr_representation { PSR_AUTOMATIC, PSR_BLOCKS, PSR_OCTREE };
+/* How a model is drawn. Automatic: as blocks if it has any, else as an octree if it has one. */
+enum psr_representation { PSR_AUTOMATIC, PSR_BLOCKS, PSR_OCTREE, PSR_DPOINTS };
 
 /* world = translation + scale * rotate(rotation, object) */
 struct psr_instance {

@@ -3,6 +3,7 @@
 #include "base/maths.h"
 #include "base/root.h"
 #include "base/srgb.h"
+#include "points.h"
 #include "strip_parts.h"
 
 static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
@@ -69,6 +70,19 @@ static void find_leaves(struct strip_pixels *p, const struct warp_instance *in, 
 	}
 }
 
+static void find_points(struct strip_pixels *p, const struct warp_instance *in, uint32_t first, uint32_t end)
+{
+	const struct psr_points *points = in->points->model;
+
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t group = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot;
+
+		p->at[i] = &points->set->word[points->set->group[group].first + p->id[i] % PSR_BLOCK_SAMPLES].attr;
+		p->two_sided[i] = points->groups.flags[group] & PSR_BLOCK_TWO_SIDED;
+		__builtin_prefetch(p->at[i]);
+	}
+}
+
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
@@ -77,8 +91,11 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 		const struct warp_instance *in = instance_run(&end, p, view, i, n);
 		const struct psr_blocks b = *in->blocks;
 
-		if (in->cubes) {
-			find_leaves(p, in, i, end);
+		if (in->cubes || in->points) {
+			if (in->cubes)
+				find_leaves(p, in, i, end);
+			else
+				find_points(p, in, i, end);
 			i = end;
 			continue;
 		}
@@ -232,7 +249,10 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	for (uint32_t first = 0, end; first < n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, n);
 
-		turn_normals(strip, in->turn, first, end);
+		if (in->points)
+			points_resolve(strip, view, in, first, end);
+		else
+			turn_normals(strip, in->turn, first, end);
 		if (p->has_cones)
 			straighten(strip, in->turn, first, end);
 	}

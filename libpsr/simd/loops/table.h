@@ -7,6 +7,7 @@
 #include "gaps.h"
 #include "simd/kernels.h"
 #include "light.h"
+#include "points.h"
 #include "reproject.h"
 #include "reproject_fit.h"
 #include "shadow.h"
@@ -21,6 +22,7 @@
 	.warp_cells = warp_cells,                      \
 	.warp = warp_kernel,                           \
 	.warp_leaves = leaves_kernel,                  \
+	.warp_points = warp_points,                    \
 	.veil = veil_kernel,                           \
 	.strip_list = KERNEL(strip_list),              \
 	.strip_find = strip_find,                      \

@@ -99,6 +99,8 @@ static void an_instance_may_name_its_representation(void **state)
 	assert_string_equal(wish.model, "a");
 	assert_int_equal(instance_parse(&wish, "a,scale=2,as=blocks", NULL), PSR_OK);
 	assert_int_equal(wish.place.representation, PSR_WIRE_REP_BLOCKS);
+	assert_int_equal(instance_parse(&wish, "a,as=dpoints", NULL), PSR_OK);
+	assert_int_equal(wish.place.representation, PSR_WIRE_REP_DPOINT);
 }
 
 static void bad_instances_are_refused_with_a_sentence(void **state)
@@ -113,8 +115,8 @@ static void bad_instances_are_refused_with_a_sentence(void **state)
 		{ "a,scale=0", "scale is a number above 0, not '0'" },
 		{ "a,scale=-1", "scale is a number above 0" },
 		{ "a,scal=2", "unknown part 'scal=2'" },
-		{ "a,as=octrees", "as is blocks or octree, not 'octrees'" },
-		{ "a,as=,scale=2", "as is blocks or octree" },
+		{ "a,as=octrees", "as is blocks, octree or dpoints, not 'octrees'" },
+		{ "a,as=,scale=2", "as is blocks, octree or dpoints" },
 		{ "a,rotate=Y", "behind the axis" },
 		{ "a,rotate=Y:", "behind the axis" },
 		{ "a,rotate=W:90", "rotate is AXIS:DEG" },

@@ -71,7 +71,8 @@ static void a_made_point_has_the_shape_that_it_was_made_of(void **state)
 	}
 }
 
-/* The greatest angle between a direction and its triangle's centre: over all triangles, centre to corners. */
+/* Half a step along both tangents, where these cross the triangle's centre: an angle is less than its tangent. Steps of
+ * a triangle, eight along each tangent, reach over its corners: their greatest distance is checked, too. */
 static double normal_radius(void)
 {
 	double worst = 1;
@@ -84,7 +85,8 @@ static double normal_radius(void)
 		for (int k = 0; k < 3; k++)
 			worst = fmin(worst, v3d_dot(center, corner[k]));
 	}
-	return acos(worst) + 1e-6;
+	assert_true(tan(acos(worst)) <= 4 * (double)DPOINT_FINE_STEP);
+	return sqrt(0.5) * (double)DPOINT_FINE_STEP + 1e-6;
 }
 
 static void an_unpacked_point_is_within_the_promised_steps(void **state)

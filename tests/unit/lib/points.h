@@ -31,7 +31,8 @@ static inline void points_of_patch(struct dpoint_set *set, const struct dpoint_p
 		surface.candidate[i].point.attr = attr;
 	assert_int_equal(dpoint_set_make(set, &(struct dpoint_grouping){ &surface, &choice, options.sine, NULL }), PSR_OK);
 	dpoint_measure(&errors, &surface, &cover, &choice);
-	set->height = (float)errors.height_worst;
+	/* Measured in the middles of cells, of which corners are further off, before places are rounded. */
+	set->height = (float)(2 * errors.height_worst) + options.slack;
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
 	dpoint_surface_fini(&surface);

@@ -40,7 +40,7 @@ static void welcome_tells_the_limits(void **state)
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
 	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_RESOLUTION |
-	                                           PSR_CAP_PRESETS | PSR_CAP_OCTREE | PSR_CAP_RMSE_BOUND |
+	                                           PSR_CAP_PRESETS | PSR_CAP_OCTREE | PSR_CAP_DPOINT |
 	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
 	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
 	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
@@ -579,7 +579,7 @@ static void what_is_not_offered_is_refused_by_name(void **state)
 	scene->instance[0].representation = PSR_WIRE_REP_DPOINT;
 	peer_send_scene(&p, scene);
 	peer_expect_error(&p, p.id, PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "this server draws blocks and octrees"));
+	assert_non_null(strstr(text, "asks for representation 3 (differential points), and its model has blocks alone"));
 	/* The scene that failed has left its slot empty. */
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_NOT_FOUND, NULL);
 	peer_close(&p);
