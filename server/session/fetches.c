@@ -230,6 +230,10 @@ static void on_read(void *userdata)
 		return;
 	}
 	session->fetches.read = NULL;
+	if (session->conn->state != CONN_OPEN) { /* its last message is queued: none may follow */
+		destroy(read);
+		return;
+	}
 	if (read->code != PSR_OK) {
 		refuse_first(session, read->code, read->error.text);
 	} else if (read->chunk == NULL) {
