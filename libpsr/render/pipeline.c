@@ -13,7 +13,7 @@ static void warp_one(int i, void *userdata)
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	const uint32_t clean = warp_parts(&r->plan, b->is_clean, tile);
 	const struct warp_into into = { &b->stack, clean, NULL };
-	/* Where two samples are not in a pixel of the plain frame, cuts would show as corners. */
+	/* Where samples are half a plain pixel apart or less: magnified stills keep their whole discs. */
 	const unsigned cut_below = r->inside != NULL ? r->inside->pass : 0;
 	const struct splat_into discs = { &b->stack, clean, b->offcuts, cut_below };
 
