@@ -2,13 +2,13 @@
 
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format)
 {
-	static const uint8_t bytes[PSR_N_PLANES] = { 1, 4, 2, 4, 1, 8, 1 };
+	static const uint8_t bytes[PSR_N_PLANES] = { 1, 4, 2, 4, 1, 8, 1, 2 };
 	return plane == PSR_PLANE_DEPTH && depth_format != PSR_WIRE_DEPTH_F32 ? 2 : bytes[plane];
 }
 
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format)
 {
-	static const uint8_t n_components[PSR_N_PLANES] = { 3, 1, 3, 1, 1, 1, 3 };
+	static const uint8_t n_components[PSR_N_PLANES] = { 3, 1, 3, 1, 1, 1, 3, 1 };
 	return n_components[plane] * psr_plane_component_bytes(plane, depth_format);
 }
 
@@ -29,7 +29,7 @@ uint64_t psr_plane_capability(unsigned plane)
 	static const uint32_t capability[PSR_N_PLANES] = {
 		[PSR_PLANE_NORMAL] = PSR_CAP_NORMAL, [PSR_PLANE_ID] = PSR_CAP_ID,
 		[PSR_PLANE_WEIGHT] = PSR_CAP_WEIGHT, [PSR_PLANE_WORDS] = PSR_CAP_WORDS,
-		[PSR_PLANE_BLOCK] = PSR_CAP_BLOCK,
+		[PSR_PLANE_BLOCK] = PSR_CAP_BLOCK, [PSR_PLANE_BOUND] = PSR_CAP_BOUND,
 	};
 	return capability[plane];
 }

@@ -14,7 +14,7 @@ static int is_npy(const char *path)
 
 static size_t npy_header(char header[128], const struct psr_frame *picture, unsigned plane)
 {
-	static const char *const types[PSR_N_PLANES] = { "|u1", "<f4", "<i2", "<u4", "|u1", "<u8", "|u1" };
+	static const char *const types[PSR_N_PLANES] = { "|u1", "<f4", "<i2", "<u4", "|u1", "<u8", "|u1", "<u2" };
 	static const size_t start = 10; /* magic, version, length of the dictionary */
 	unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 	int has_three = pixel != psr_plane_component_bytes(plane, PSR_WIRE_DEPTH_F32);

@@ -23,10 +23,10 @@ void sink_add_developer_options(struct optlist *list, struct sink_wish *wish)
 {
 	const struct psr_opt opts[] = {
 		{ .name = "plane", .type = PSR_OPT_STRING, .value = &wish->plane_text, .arg = "PLANE",
-		  .words = "color depth normal id weight words block",
-		  .help = "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or "
-		          "block (levels, facing). All go to .npy; color, normal and weight to pictures, depth as with "
-		          "--depth." },
+		  .words = "color depth normal id weight words block bound",
+		  .help = "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id), "
+		          "block (levels, facing) or bound (of the geometric error). All go to .npy; color, normal and weight "
+		          "to pictures, depth as with --depth." },
 		{ .name = "show", .type = PSR_OPT_STRING, .value = &wish->show_text, .arg = "STAGE",
 		  .words = "blocks samples cull levels normals weights holes depth",
 		  .help = "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, "
@@ -73,7 +73,7 @@ static int check_plane(struct sink *sink, struct psr_error *err)
 	while (wish->plane_text != NULL && strcmp(psr_plane_name(sink->plane), wish->plane_text) != 0)
 		if (++sink->plane == PSR_N_PLANES)
 			return psr_fail(err, PSR_ERR_ARG,
-			                "--plane takes color, depth, normal, id, weight, words or block, not '%.40s'",
+			                "--plane takes color, depth, normal, id, weight, words, block or bound, not '%.40s'",
 			                wish->plane_text);
 	if (wish->show_text != NULL) {
 		sink->show = show_find(wish->show_text, err);

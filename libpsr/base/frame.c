@@ -15,6 +15,7 @@ static const struct {
 	[PSR_PLANE_WEIGHT] = { "weight", offsetof(struct psr_frame, weight), 1 },
 	[PSR_PLANE_WORDS] = { "words", offsetof(struct psr_frame, words), 8 },
 	[PSR_PLANE_BLOCK] = { "block", offsetof(struct psr_frame, block), 3 },
+	[PSR_PLANE_BOUND] = { "bound", offsetof(struct psr_frame, bound), 2 },
 };
 
 const char *psr_plane_name(unsigned plane)

@@ -38,9 +38,8 @@ struct counting {
 	struct cull_hit *hit;
 };
 
-/* How far what a block draws may be from the surface, in pixels: a sample from the surface, and what it draws from the
- * sample. This is half a pixel along both axes; the square of a veil two pixels apart or more; the disc of a splat. */
-static float place_error(const struct plan *plan, unsigned traits, float apart, float depth_error)
+/* What is drawn is half a pixel along both axes; the square of a veil two pixels apart or more; the disc of a splat. */
+float cull_place_error(const struct plan *plan, unsigned traits, float apart, float depth_error)
 {
 	const float half = 0.70710678f;
 	float drawn = half;
@@ -92,7 +91,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		chunk->flags |= b->flags[block];
 		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
 		chunk->n_samples += cull_n_samples(in, block);
-		const float error = place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
+		const float error = cull_place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
 		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;
 	}

@@ -349,12 +349,14 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	*report = r->report;
 	r->frame = frame;
 	r->has_planes = frame->normal != NULL || frame->id != NULL || frame->block != NULL
-	                || frame->weight != NULL || frame->words != NULL;
+	                || frame->weight != NULL || frame->words != NULL || frame->bound != NULL;
 	int rc = begin_finish(r, smooth, err);
 	if (rc == PSR_OK)
 		rc = shade_picture(r, pool, report, err);
 	if (rc)
 		return rc;
+	if (frame->bound != NULL)
+		planes_bound_filled(frame);
 
 	uint64_t start = clock_ns();
 	if (smooth == PSR_WHY_RAN && smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb))

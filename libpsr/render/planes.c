@@ -1,6 +1,9 @@
 #include "planes.h"
 
 #include <string.h>
+#include "cull.h"
+
+#define FILLED UINT16_MAX /* marks pixels until planes_bound_filled() */
 
 static void put_words(const struct simd *simd, const struct plan *plan, uint64_t *to, const uint64_t *word, uint32_t n)
 {
@@ -85,6 +88,59 @@ static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t
 	}
 }
 
+/* Rounds up. */
+static uint16_t to_bound(float pixels)
+{
+	const float steps = pixels * PSR_BOUND_ONE;
+
+	if (!(steps < FILLED))
+		return FILLED;
+	const uint16_t whole = (uint16_t)steps;
+	return (uint16_t)(whole + ((float)whole < steps));
+}
+
+static uint16_t bound_of(const struct simd *simd, const struct plan *plan, uint32_t slot)
+{
+	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, slot)];
+	const uint32_t block = slot - in->first_slot;
+	struct cull_batch batch;
+
+	simd->cull(&batch, &in->cull, block, 1);
+	return to_bound(cull_place_error(plan, psr_blocks_traits(in->cull.blocks, block), batch.apart[0],
+	                                 batch.depth_error[0]));
+}
+
+static void put_bounds(const struct simd *simd, const struct plan *plan, uint16_t *to,
+                       const struct strip_pixels *pixels)
+{
+	uint16_t last = 0;
+
+	for (uint32_t i = 0; i < pixels->n; i++) {
+		const uint32_t slot = pixels->id[i] / PSR_BLOCK_SAMPLES;
+
+		if (i == 0 || slot != pixels->id[i - 1] / PSR_BLOCK_SAMPLES)
+			last = bound_of(simd, plan, slot);
+		to[pixels->x[i]] = last;
+	}
+}
+
+/* Covered by more than half, a pixel takes its depth from nearer cells. */
+static void mark_filled(uint16_t *to, const uint16_t *weight, uint32_t n)
+{
+	for (uint32_t x = 0; x < n; x++)
+		if (weight[x] < WEIGHT_ONE / 2)
+			to[x] = FILLED;
+}
+
+void planes_bound_filled(const struct psr_frame *frame)
+{
+	const uint16_t bound = to_bound((float)frame->report.error_px * (1 + 0x1p-20f));
+
+	for (size_t i = 0; i < (size_t)frame->width * frame->height; i++)
+		if (frame->bound[i] == FILLED)
+			frame->bound[i] = bound;
+}
+
 /* Pixels without a sample. */
 static void clear_samples(const struct psr_frame *frame, size_t first, uint32_t n)
 {
@@ -94,6 +150,8 @@ static void clear_samples(const struct psr_frame *frame, size_t first, uint32_t 
 		memset(frame->id + first, 0xff, n * sizeof *frame->id);
 	if (frame->block != NULL)
 		memset(frame->block + 3 * first, 0xff, 3 * n);
+	if (frame->bound != NULL)
+		memset(frame->bound + first, 0, n * sizeof *frame->bound);
 }
 
 static void put_samples(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, size_t first,
@@ -105,6 +163,8 @@ static void put_samples(const struct simd *simd, const struct plan *plan, const 
 		put_instances(plan, frame->id + first, pixels);
 	if (pixels->n && frame->block != NULL)
 		put_blocks(simd, plan, frame->block + 3 * first, pixels);
+	if (pixels->n && frame->bound != NULL)
+		put_bounds(simd, plan, frame->bound + first, pixels);
 }
 
 void planes_row(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
@@ -122,12 +182,14 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
 			put_words(simd, plan, frame->words + first, word + x, n);
 		if (frame->weight != NULL)
 			put_weights(frame->weight + first, weight + x, n);
-		if (frame->normal == NULL && frame->id == NULL && frame->block == NULL)
+		if (frame->normal == NULL && frame->id == NULL && frame->block == NULL && frame->bound == NULL)
 			continue;
 		pixels.x0 = x;
 		simd->strip_list(&pixels, word + x, weight + x, n);
 		clear_samples(frame, first, n);
 		put_samples(simd, plan, frame, first, &pixels);
+		if (frame->bound != NULL)
+			mark_filled(frame->bound + first, weight + x, n);
 	}
 }
 

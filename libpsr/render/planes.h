@@ -4,8 +4,8 @@
 
 #include "plan.h"
 
-/* Writes row y of the planes normal, id, block, weight and words that the frame has. Before the fill, which changes
- * weights. */
+/* Writes row y of the planes normal, id, block, bound, weight and words that the frame has. Before the fill, which
+ * changes weights. */
 void planes_row(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
                 const uint16_t *weight, uint32_t y);
 
@@ -18,5 +18,9 @@ struct planes_part {
  * Their weight is whole. Leaves the plane of words alone. */
 void planes_over(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
                  const struct planes_part *part);
+
+/* Gives pixels whose depth the fill moved, which planes_row() has marked, the bound of the frame's report: after the
+ * fill, before planes_over(). */
+void planes_bound_filled(const struct psr_frame *frame);
 
 #endif

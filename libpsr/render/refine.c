@@ -331,7 +331,7 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	if (frame->width != settings->width || frame->height != settings->height)
 		return psr_fail(err, PSR_ERR_ARG, "the frame is of another size than the settings");
 	if (frame->normal != NULL || frame->id != NULL || frame->block != NULL || frame->weight != NULL
-	    || frame->words != NULL)
+	    || frame->words != NULL || frame->bound != NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "only colour and depth are refined, no other planes");
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);

@@ -219,6 +219,7 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	picture->depth = take_plane(&next, picture, wanted, PSR_PLANE_DEPTH);
 	picture->id = take_plane(&next, picture, wanted, PSR_PLANE_ID);
 	picture->normal = take_plane(&next, picture, wanted, PSR_PLANE_NORMAL);
+	picture->bound = take_plane(&next, picture, wanted, PSR_PLANE_BOUND);
 	picture->weight = take_plane(&next, picture, wanted, PSR_PLANE_WEIGHT);
 	picture->block = take_plane(&next, picture, wanted, PSR_PLANE_BLOCK);
 	picture->rgb = take_plane(&next, picture, wanted, PSR_PLANE_COLOR);

@@ -43,7 +43,7 @@ static void guess(struct budget_view *view, const struct scene *scene, const dou
 }
 
 /* What calibrations of the scene's models foresee for what is seen: the greatest error of a model, and the times of all
- * instances together. sight NULL: nothing is known of the view. */
+ * models together. sight NULL: nothing is known of the view. */
 static void foresee(struct budget_view *view, const struct scene *scene, const struct survey *sight)
 {
 	const struct psr_calibrated like = {

@@ -69,6 +69,7 @@ void budget_rmse_print(struct budget_likes *likes); /* beside the targets; frees
 struct budget_bounds {
 	uint64_t n_frames, n_broken;
 	double *ratio; /* the bound over the 99.9th percentile of the distances: by frame */
+	double *plane; /* the same of the plane's 99.9th percentile */
 	size_t n;
 };
 

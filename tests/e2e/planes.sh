@@ -3,7 +3,7 @@
 # Planes beside colour and depth, and pictures of stages: the same bytes whatever the threads, the ISA and the codec of
 # colour; files of the right size; each stage a picture of its own.
 . "$(dirname "$0")/lib.sh"
-planes=(color depth normal id weight words block)
+planes=(color depth normal id weight words block bound)
 stages=(blocks samples cull levels normals weights holes depth)
 views=("--model teapot" "--model dice --eye 1,0.8,1.2 --ortho 0.5" "--model wheel --size 64x48")
 
@@ -23,7 +23,7 @@ for run in "1 avx512" "3 avx512" "2 avx2" "2 c"; do
 	check "psrd of ${run% *} threads, ${run#* } at most, stops cleanly" stop_psrd
 	check "its planes are those of one thread" cmp "$work/hashes-1-avx512" "$work/hashes-${run/ /-}"
 done
-is "every plane of every view has a hash" 21 "$(grep -cE '^[a-z]+ [0-9a-f]{16}$' "$work/hashes-1-avx512")"
+is "every plane of every view has a hash" 24 "$(grep -cE '^[a-z]+ [0-9a-f]{16}$' "$work/hashes-1-avx512")"
 
 start_psrd --models tests/golden --threads 2
 teapot() { shot --model teapot "$@"; }
@@ -38,6 +38,7 @@ done <<-END
 	weight 1
 	words 8
 	block 3
+	bound 2
 END
 check "colour is written as a picture, too" teapot --plane color -o "$work/color.ppm"
 check "and has the same bytes" cmp <(tail -c +129 "$work/color.npy") <(tail -c $((301 * 203 * 3)) "$work/color.ppm")

@@ -16,7 +16,7 @@ extern "C" {
 
 enum psr_plane {
 	PSR_PLANE_COLOR, PSR_PLANE_DEPTH, PSR_PLANE_NORMAL, PSR_PLANE_ID, PSR_PLANE_WEIGHT, PSR_PLANE_WORDS,
-	PSR_PLANE_BLOCK,
+	PSR_PLANE_BLOCK, PSR_PLANE_BOUND,
 	PSR_N_PLANES
 };
 
@@ -27,6 +27,8 @@ enum psr_facing {
 	PSR_FACING_MIXED,     /* some samples may face away: the renderer tested each */
 	PSR_FACING_TWO_SIDED, /* faces both ways: the renderer tested no sample */
 };
+
+#define PSR_BOUND_ONE 256
 
 /* Rows run from the top down, without gaps. A NULL plane is left out. Depth, normal, id and block describe the sample
  * that a pixel shows: of the nearest translucent surface where translucent surfaces hold back at least half of the
@@ -41,6 +43,9 @@ struct psr_frame {
 	uint32_t *id;     /* width * height, index of the instance; UINT32_MAX without a sample */
 	uint8_t *block;   /* 3 * width * height: level in the model, level of the depth buffer, enum psr_facing; 255, 255,
 	                   * 255 without a sample */
+	uint16_t *bound;  /* width * height: how far the pixel's centre, at its depth, may be from the surface, in steps of
+	                   * PSR_BOUND_ONE a pixel, rounded up; UINT16_MAX: more than that. Of pixels that take their depth
+	                   * from cells of the fill, the frame's bound (report.error_px). 0 where nothing is */
 	uint8_t *weight;  /* width * height, round(255 * weight) before the fill ([G] 4.6); 255 where the pixel is empty
 	                   * and no cell covers it, and where the sample's surface is translucent */
 	uint64_t *words;  /* width * height, as warped, of opaque surfaces alone: bits of the float z' in world units
@@ -58,7 +63,7 @@ int psr_frame_alloc(struct psr_frame *frame, uint32_t width, uint32_t height, un
 void psr_frame_free(struct psr_frame *frame);
 
 void *psr_frame_plane(const struct psr_frame *frame, unsigned plane); /* the plane's pixels; NULL if it is left out */
-const char *psr_plane_name(unsigned plane); /* "color", "depth", "normal", "id", "weight", "words", "block" */
+const char *psr_plane_name(unsigned plane); /* "color", "depth", "normal", "id", "weight", "words", "block", "bound" */
 size_t psr_plane_bytes(unsigned plane);     /* a pixel */
 
 /* Computes the hash of a plane, which the frame must have: XXH64, seed 0, of the little-endian XXH64s of its strips of

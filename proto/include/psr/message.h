@@ -51,6 +51,7 @@ enum psr_cap {
 	PSR_CAP_BLOCK = 1 << 20,
 	PSR_CAP_SHARP = 1 << 22,       /* FRAME with PSR_WIRE_FRAME_SHARP; needs VIEWS */
 	PSR_CAP_RMSE_BOUND = 1 << 23,
+	PSR_CAP_BOUND = 1 << 24,       /* the plane of bounds */
 };
 
 /* ---- the session ---- */

@@ -43,6 +43,7 @@ static void planes_are_their_members(void **state)
 	assert_ptr_equal(psr_frame_plane(&frame, PSR_PLANE_WEIGHT), frame.weight);
 	assert_ptr_equal(psr_frame_plane(&frame, PSR_PLANE_WORDS), frame.words);
 	assert_ptr_equal(psr_frame_plane(&frame, PSR_PLANE_BLOCK), frame.block);
+	assert_ptr_equal(psr_frame_plane(&frame, PSR_PLANE_BOUND), frame.bound);
 	psr_frame_free(&frame);
 }
 

@@ -64,7 +64,7 @@ static void start_planes(struct trial *trial, uint8_t codec, uint32_t wanted)
 		.width = W, .height = H, .rgb = planes[PSR_PLANE_COLOR], .depth = (float *)planes[PSR_PLANE_DEPTH],
 		.normal = (int16_t *)planes[PSR_PLANE_NORMAL], .id = (uint32_t *)planes[PSR_PLANE_ID],
 		.weight = planes[PSR_PLANE_WEIGHT], .words = (uint64_t *)planes[PSR_PLANE_WORDS],
-		.block = planes[PSR_PLANE_BLOCK],
+		.block = planes[PSR_PLANE_BLOCK], .bound = (uint16_t *)planes[PSR_PLANE_BOUND],
 	};
 	struct psr_msg_frame *asked = &trial->asked;
 

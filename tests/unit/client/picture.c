@@ -152,11 +152,12 @@ static void npy_holds_every_plane_as_it_is(void **state)
 		{ PSR_PLANE_COLOR, "|u1", "(3, 5, 3)" }, { PSR_PLANE_DEPTH, "<f4", "(3, 5)" },
 		{ PSR_PLANE_NORMAL, "<i2", "(3, 5, 3)" }, { PSR_PLANE_ID, "<u4", "(3, 5)" },
 		{ PSR_PLANE_WEIGHT, "|u1", "(3, 5)" }, { PSR_PLANE_WORDS, "<u8", "(3, 5)" },
-		{ PSR_PLANE_BLOCK, "|u1", "(3, 5, 3)" },
+		{ PSR_PLANE_BLOCK, "|u1", "(3, 5, 3)" }, { PSR_PLANE_BOUND, "<u2", "(3, 5)" },
 	};
 	static uint8_t data[8 * W * H];
 	struct psr_frame all = { .width = W, .height = H, .rgb = data, .depth = (float *)data, .normal = (int16_t *)data,
-		                       .id = (uint32_t *)data, .weight = data, .words = (uint64_t *)data, .block = data };
+		                       .id = (uint32_t *)data, .weight = data, .words = (uint64_t *)data, .block = data,
+		                       .bound = (uint16_t *)data };
 
 	(void)state;
 	for (unsigned i = 0; i < sizeof data; i++)

@@ -134,7 +134,7 @@ static void make_frame(struct psr_msg_frame *m)
 	m->pass_limit = (uint16_t)below(65536);
 	m->width = 1 + below(16384);
 	m->height = 1 + below(4096);
-	m->planes = 1 + below(127);
+	m->planes = 1 + below(255);
 	if (m->planes & 1) {
 		m->color_codec = (uint8_t)below(4);
 		m->color_quality = m->color_codec == PSR_CODEC_JPEG ? (uint8_t)(1 + below(100)) : 0;
@@ -221,7 +221,7 @@ static void make_end(struct psr_msg_frame_end *m)
 	m->is_final = (uint8_t)below(2);
 	m->status = (uint8_t)below(3);
 	m->error_px = fabs(length());
-	m->planes = 1 + below(127);
+	m->planes = 1 + below(255);
 	m->has_hashes = (uint8_t)below(2);
 	if (m->planes & 1u << PSR_PLANE_DEPTH) {
 		m->depth_min = fabs(length()) * 1e-2;
@@ -580,6 +580,8 @@ static void planes_have_the_bytes_of_the_table(void **state)
 	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_WORDS, 0), 8);
 	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_BLOCK, 0), 3);
 	assert_int_equal(psr_plane_component_bytes(PSR_PLANE_BLOCK, 0), 1);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_BOUND, 0), 2);
+	assert_int_equal(psr_plane_component_bytes(PSR_PLANE_BOUND, 0), 2);
 }
 
 static void planes_have_names_capabilities_and_backgrounds(void **state)
@@ -596,6 +598,7 @@ static void planes_have_names_capabilities_and_backgrounds(void **state)
 		{ "weight", 1 << 10, { 0xff } },
 		{ "words", 1 << 11, { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f } },
 		{ "block", 1 << 20, { 0xff, 0xff, 0xff } },
+		{ "bound", 1 << 24, { 0 } },
 	};
 
 	(void)state;

@@ -25,6 +25,7 @@ static const struct psr_frame drawn = {
 	.width = WIDTH, .height = HEIGHT, .rgb = in[PSR_PLANE_COLOR], .depth = (float *)in[PSR_PLANE_DEPTH],
 	.normal = (int16_t *)in[PSR_PLANE_NORMAL], .id = (uint32_t *)in[PSR_PLANE_ID], .weight = in[PSR_PLANE_WEIGHT],
 	.words = (uint64_t *)in[PSR_PLANE_WORDS], .block = in[PSR_PLANE_BLOCK],
+	.bound = (uint16_t *)in[PSR_PLANE_BOUND],
 };
 static const uint8_t background[3] = { 10, 20, 30 };
 

@@ -45,7 +45,7 @@ static void welcome_tells_the_limits(void **state)
 	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
 	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
 	                                           PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND | PSR_CAP_RMSE_BOUND |
-	                                           PSR_CAP_FETCH);
+	                                           PSR_CAP_BOUND | PSR_CAP_FETCH);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -83,7 +83,7 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 		.width = WIDTH, .height = HEIGHT, .rgb = planes[PSR_PLANE_COLOR], .depth = (float *)planes[PSR_PLANE_DEPTH],
 		.normal = (int16_t *)planes[PSR_PLANE_NORMAL], .id = (uint32_t *)planes[PSR_PLANE_ID],
 		.block = planes[PSR_PLANE_BLOCK], .weight = planes[PSR_PLANE_WEIGHT],
-		.words = (uint64_t *)planes[PSR_PLANE_WORDS],
+		.words = (uint64_t *)planes[PSR_PLANE_WORDS], .bound = (uint16_t *)planes[PSR_PLANE_BOUND],
 	};
 	const unsigned n_pixels = WIDTH * HEIGHT;
 	struct psr_message message;
