@@ -17,11 +17,13 @@
 #include "psr/mesh.h"
 #include "model/blocks.h"
 #include "measure/calibrate.h"
+#include "model/points.h"
 #include "model/tree.h"
 #include "octree.h"
+#include "points.h"
+#include "progress.h"
 
 #define PROGRAM "psr-model build"
-#define BAR_WIDTH 32
 #define CALIBRATION_SEED 31 /* views that evaluations have are others */
 #define FORMATS \
 	"IN is told by its first bytes and its ending:\n" \
@@ -35,38 +37,6 @@
 	"  PTS, PTX, XYZ\n" \
 	"              clouds as text, for octrees alone\n" \
 	"  the others  OBJ, STL, OFF, 3DS, Collada and other formats that Assimp reads"
-
-struct progress {
-	int fd;     /* -1: none */
-	int has_bar;
-	int failed; /* the reader of fd is gone */
-};
-
-static void draw_bar(const char *stage, uint64_t done, uint64_t total)
-{
-	char bar[BAR_WIDTH + 1];
-	int n = (int)((double)done / (double)total * BAR_WIDTH);
-
-	memset(bar, ' ', BAR_WIDTH);
-	memset(bar, '#', (size_t)n);
-	bar[BAR_WIDTH] = '\0';
-	fprintf(stderr, "\r%-8s [%s] %3d %%", stage, bar, (int)((double)done / (double)total * 100));
-}
-
-static void clear_bar(void)
-{
-	fprintf(stderr, "\r%*s\r", BAR_WIDTH + 18, "");
-}
-
-static void on_progress(const char *stage, uint64_t done, uint64_t total, void *userdata)
-{
-	struct progress *progress = userdata;
-
-	if (progress->has_bar)
-		draw_bar(stage, done, total);
-	if (progress->fd >= 0 && !progress->failed)
-		progress->failed = dprintf(progress->fd, "%s %" PRIu64 " %" PRIu64 "\n", stage, done, total) < 0;
-}
 
 /* IN's name with .psr for its suffix; the caller frees it. */
 static char *default_output(const char *in)
@@ -107,7 +77,8 @@ struct wish {
 	struct psr_import_options import;
 	struct psr_build_options build;
 	struct octree_wish octree;
-	int is_blocks, is_octree, is_packed, is_calibrated, quiet;
+	struct points_wish points;
+	int is_blocks, is_octree, is_points, is_packed, is_calibrated, quiet;
 };
 
 /* What was made on the way to a model. */
@@ -117,6 +88,7 @@ struct made {
 	struct psr_model *blocks, *model; /* of blocks alone, and the result */
 	struct octree_input input;
 	struct psr_build_report report;
+	struct dpoint_build_report points;
 	double seconds_octree;
 };
 
@@ -137,6 +109,10 @@ static void summarize(const char *out, const struct made *made)
 	if (made->input.n_left_out > 0)
 		fprintf(stderr, PROGRAM ": warning: %s: points without a finite place were left out: %" PRIu64 "\n",
 		        made->input.path, made->input.n_left_out);
+	if (psr_model_point_set(made->model) != NULL)
+		printf("%s: %" PRIu64 " differential points of %" PRIu64 ", %.2f MB, from %" PRIu32 " triangles in %.1f s; normals"
+		       " within %.1f degrees\n", out, made->points.n_kept, made->points.n_candidates, (double)file_bytes / 1e6,
+		       mesh->n_triangles, made->points.seconds, made->points.normal_worst / PSR_DEGREE);
 	if (tree != NULL)
 		printf("%s: %" PRIu64 " leaves of %.3g in an octree of %d levels, %.1f MB, from %" PRIu64 " %s in %.1f s\n", out,
 		       tree->n_leaves, ldexp(made->tree->edge, -tree->levels), tree->levels, (double)file_bytes / 1e6,
@@ -180,7 +156,7 @@ static int measure_ladder(struct made *made, const struct wish *wish, struct psr
 	static struct psr_calibrated view[CALIBRATE_VIEWS];
 	const struct calibrate_options options = {
 		.n_views = CALIBRATE_VIEWS, .seed = CALIBRATION_SEED, .n_threads = wish->build.n_threads,
-		.on_progress = on_progress, .userdata = wish->build.userdata,
+		.on_progress = progress_show, .userdata = wish->build.userdata,
 	};
 	const struct psr_calibration calibration = { CALIBRATE_VIEWS, view };
 	struct psr_model *calibrated;
@@ -201,7 +177,7 @@ static int make(struct made *made, const struct wish *wish, struct psr_error *er
 
 	made->input.is_direct = wish->is_octree && octree_is_direct(made->input.path);
 	if (wish->is_blocks || !made->input.is_direct) {
-		on_progress("import", 0, 1, wish->build.userdata);
+		progress_show("import", 0, 1, wish->build.userdata);
 		code = psr_mesh_import(&made->mesh, made->input.path, &wish->import, err);
 		made->input.mesh = made->mesh;
 	}
@@ -211,6 +187,8 @@ static int make(struct made *made, const struct wish *wish, struct psr_error *er
 		code = make_octree(made, wish, err);
 	if (code == PSR_OK && wish->is_octree)
 		code = join(made, wish, err);
+	else if (code == PSR_OK && wish->is_points)
+		code = points_make(&made->model, &made->points, made->mesh, &wish->points, err);
 	else if (code == PSR_OK)
 		made->model = psr_model_ref(made->blocks);
 	if (code == PSR_OK && wish->is_calibrated)
@@ -225,11 +203,11 @@ static int build(const char *in, const char *out, const struct wish *wish, struc
 	int code = make(&made, wish, err);
 
 	if (code == PSR_OK) {
-		on_progress("write", 0, 1, progress);
+		progress_show("write", 0, 1, progress);
 		code = wish->is_packed ? psr_model_write_packed(made.model, out, err) : psr_model_write(made.model, out, err);
 	}
 	if (progress->has_bar)
-		clear_bar();
+		progress_clear();
 	if (code == PSR_OK && !wish->quiet) {
 		if (made.mesh != NULL)
 			warn(made.mesh);
@@ -248,17 +226,18 @@ static int take_representation(const char *text, void *userdata, struct psr_erro
 {
 	struct wish *wish = userdata;
 
-	if (strcmp(text, "blocks") != 0 && strcmp(text, "octree") != 0 && strcmp(text, "both") != 0)
-		return psr_fail(err, PSR_ERR_ARG, "%s is not known; it is blocks, octree or both", text);
+	wish->is_points = strcmp(text, "dpoints") == 0;
+	if (!wish->is_points && strcmp(text, "blocks") != 0 && strcmp(text, "octree") != 0 && strcmp(text, "both") != 0)
+		return psr_fail(err, PSR_ERR_ARG, "%s is not known; it is blocks, octree, both or dpoints", text);
 	wish->is_blocks = text[0] == 'b';
-	wish->is_octree = strcmp(text, "blocks") != 0;
+	wish->is_octree = text[0] == 'o' || strcmp(text, "both") == 0;
 	return PSR_OK;
 }
 
 /* Whoever names no representation gets what suits the file. One that cannot be read has its error when it is built. */
 static void choose_representation(struct wish *wish, const char *in)
 {
-	if (wish->is_blocks || wish->is_octree)
+	if (wish->is_blocks || wish->is_octree || wish->is_points)
 		return;
 	wish->is_octree = octree_is_direct(in);
 	wish->is_blocks = !wish->is_octree;
@@ -279,6 +258,8 @@ static int check_octree(const struct wish *wish, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_ARG, "--levels and --spacing both say how fine the octree is; give one of them");
 	if (!wish->is_octree && (wish->octree.levels > 0 || wish->octree.spacing > 0 || wish->octree.with_scan))
 		return psr_fail(err, PSR_ERR_ARG, "--levels, --spacing and --scan are for octrees; add --representation octree");
+	if (!wish->is_points && (wish->points.eps > 0 || wish->points.delta > 0))
+		return psr_fail(err, PSR_ERR_ARG, "--eps and --delta are for differential points; add --representation dpoints");
 	return PSR_OK;
 }
 
@@ -315,10 +296,10 @@ int cmd_build(int argc, char **argv)
 		          " file. Then psrd keeps budgets by figures of this model. Takes some minutes." },
 		{ .name = "Octrees, for clouds of points", .type = PSR_OPT_HEADING },
 		{ .name = "representation", .type = PSR_OPT_CALL, .call = take_representation, .value = &wish, .arg = "KIND",
-		  .help = "What the model holds: blocks, octree or both. Octrees hold the points of a cloud as they are, in a tenth"
-		          " of the size and the time; blocks are of a resampled surface. Default: an octree of a file of points"
-		          " alone, blocks of a mesh.",
-		  .words = "blocks octree both" },
+		  .help = "What the model holds: blocks, octree, both, or dpoints. Octrees hold the points of a cloud as they are, in"
+		          " a tenth of the size and the time; blocks are of a resampled surface; dpoints are few points of a smooth"
+		          " mesh that know its curvature. Default: an octree of a file of points alone, blocks of a mesh.",
+		  .words = "blocks octree both dpoints" },
 		{ .name = "levels", .type = PSR_OPT_INT, .value = &levels, .arg = "K",
 		  .help = "Points within a leaf become one; a leaf is 1 / 2^K of the longest side, K 2 to 20. 0: by --spacing or by"
 		          " the number of points.", .min = 0, .max = OCTREE_MOST_LEVELS },
@@ -329,6 +310,12 @@ int cmd_build(int argc, char **argv)
 		  .min = OCTREE_LEAST_MEMORY, .max = 0x1p50 },
 		{ .name = "scan", .type = PSR_OPT_FLAG, .value = &wish.octree.with_scan,
 		  .help = "Keeps what LAS tells of points besides: intensity, class, return, GPS time; up to 8 bytes more a leaf." },
+		{ .name = "Differential points, for smooth meshes", .type = PSR_OPT_HEADING },
+		{ .name = "eps", .type = PSR_OPT_REAL, .value = &wish.points.eps, .arg = "E",
+		  .help = "A point reaches until its normal has turned by the angle whose cosine is 1 - E. 0: 0.01, which is 8"
+		          " degrees.", .min = 0, .max = 0.5 },
+		{ .name = "delta", .type = PSR_OPT_REAL, .value = &wish.points.delta, .arg = "D",
+		  .help = "And no further than this part of the model's radius. 0: an eighth.", .min = 0, .max = 1 },
 		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
@@ -380,8 +367,12 @@ int cmd_build(int argc, char **argv)
 	wish.import.is_preview = resolution <= PSR_PREVIEW_RESOLUTION;
 	wish.octree.resolution = (uint32_t)resolution;
 	wish.octree.memory = (uint64_t)memory;
-	wish.build.on_progress = wish.octree.on_progress = on_progress;
-	wish.octree.userdata = &progress;
+	wish.build.on_progress = wish.octree.on_progress = progress_show;
+	wish.octree.userdata = wish.points.userdata = &progress;
+	wish.points.on_progress = progress_show;
+	wish.points.resolution = (uint32_t)resolution;
+	wish.points.n_threads = (int)n_threads;
+	memcpy(wish.points.up, wish.build.up, sizeof wish.points.up);
 	wish.build.userdata = &progress;
 	progress.fd = (int)fd;
 	progress.has_bar = !wish.quiet && isatty(STDERR_FILENO);

@@ -2,6 +2,7 @@
 #include "model/calibration.h"
 #include "commands.h"
 #include "info_octree.h"
+#include "info_points.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -23,6 +24,7 @@ struct summary {
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks; /* NULL if there are none */
 	const struct octree *tree;       /* likewise */
+	const struct dpoint_set *points; /* likewise */
 	struct octree_shares shares;     /* zeros where the file has no packed octree */
 	uint64_t bytes, file_bytes, drawn_bytes; /* drawn_bytes: with what is made of an octree to draw it */
 	int is_packed, is_prefix;
@@ -55,6 +57,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->info = psr_model_info(model);
 	summary->blocks = psr_model_blocks(model);
 	summary->tree = psr_model_octree(model);
+	summary->points = psr_model_point_set(model);
 	psr_model_octree_shares(model, &summary->shares);
 	summary->bytes = psr_model_bytes(model);
 	summary->drawn_bytes = summary->bytes + (summary->tree != NULL ? info_octree_drawn(summary->tree) : 0);
@@ -202,6 +205,8 @@ static void print_text(const struct summary *s)
 	printf("\n");
 	if (s->tree != NULL)
 		info_print_octree(s->tree, &s->shares, s->info->scale);
+	if (s->points != NULL)
+		info_print_points(s->points, s->info->scale);
 	if (blocks == NULL)
 		return;
 	printf("samples           %" PRIu64 "\n", blocks->n_samples);
@@ -302,6 +307,8 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	}
 	if (s->tree != NULL)
 		cJSON_AddItemToObject(root, "octree", info_octree_json(s->tree, &s->shares, s->info->scale));
+	if (s->points != NULL)
+		cJSON_AddItemToObject(root, "dpoints", info_points_json(s->points, s->info->scale));
 	return json_print(root, err);
 }
 

@@ -50,7 +50,7 @@ static int put_patch(struct dpoint_surface *surface, uint32_t at, const struct d
 	const struct dpoint_cell *cell = &surface->cell[at];
 	struct dpoint_local local;
 	double extent[2];
-	struct dpoint_candidate like = { .part = cell->part, .cell = at };
+	struct dpoint_candidate like = { .point.attr = cell->attr, .part = cell->part, .cell = at };
 	int is_good = local_of_cell(&local, extent, cell);
 
 	for (int k = 0; k < 2; k++) {

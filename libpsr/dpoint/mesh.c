@@ -14,7 +14,8 @@ struct cutting {
 	struct dpoint_surface *surface;
 	const struct dpoint_mesh_options *options;
 	const struct corner *corner[3];
-	uint32_t material, n; /* parts of each side */
+	uint32_t triangle, material, n; /* n: parts of each side */
+	float delta;
 	int side;             /* the one that directions follow where any would do */
 };
 
@@ -69,29 +70,31 @@ static int local_at(struct dpoint_local *local, const struct cutting *c, const d
 /* A piece: corners at (i, j) in parts of the sides, i + j <= n. */
 static int put_piece(const struct cutting *c, const int at[3][2])
 {
-	struct dpoint_cell *cell = dpoint_surface_cell(c->surface);
-	struct dpoint_candidate like = { .delta = { c->options->delta, c->options->delta }, .part = c->material };
-	double middle[3] = { 0, 0, 0 };
+	const double u = (double)(at[0][0] + at[1][0] + at[2][0]) / (3 * c->n);
+	const double v = (double)(at[0][1] + at[1][1] + at[2][1]) / (3 * c->n);
+	struct dpoint_candidate like = { .delta = { c->delta, c->delta }, .part = c->material };
+	struct dpoint_cell *cell;
 	struct dpoint_local local;
 	int is_good;
 
+	if (c->options->look != NULL && !c->options->look(c->options->userdata, c->triangle, u, v, &like.point.attr))
+		return PSR_OK;
+	cell = dpoint_surface_cell(c->surface);
 	if (cell == NULL)
 		return PSR_ERR_MEMORY;
 	for (int p = 0; p < 3; p++) {
 		const double b = (double)at[p][0] / c->n, d = (double)at[p][1] / c->n;
-		const double weight[3] = { 1 - b - d, b, d };
 		double place[3];
 
-		place_at(place, c, weight);
-		for (int k = 0; k < 3; k++) {
+		place_at(place, c, (const double[3]){ 1 - b - d, b, d });
+		for (int k = 0; k < 3; k++)
 			cell->corner[p][k] = (float)place[k];
-			middle[k] += weight[k] / 3;
-		}
 	}
 	memcpy(cell->corner[3], cell->corner[2], sizeof cell->corner[3]);
 	memset(cell->normal, 0, sizeof cell->normal);
 	cell->part = c->material;
-	is_good = local_at(&local, c, middle);
+	cell->attr = like.point.attr;
+	is_good = local_at(&local, c, (const double[3]){ 1 - u - v, u, v });
 	for (int k = 0; k < 3 && is_good; k++)
 		cell->normal[k] = (float)local.axis[2][k];
 	like.cell = (uint32_t)c->surface->n_cells - 1;
@@ -137,6 +140,7 @@ static int put_strip(const struct cutting *c, int side)
 		for (int k = 0; k < 3; k++)
 			cell->normal[k] = (float)a->normal[k];
 		cell->part = DPOINT_BEYOND;
+		cell->attr = 0;
 	}
 	return PSR_OK;
 }
@@ -167,20 +171,23 @@ int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *me
 	struct cutting c = { .surface = surface, .options = options };
 	struct corners corners;
 	uint64_t n_pieces = 0;
-	double n_parts;
+	double n_parts, size;
 	int rc = corners_init(&corners, mesh, options);
 
 	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
 		for (int i = 0; i < 3; i++)
 			c.corner[i] = &corners.corner[corners.of[3 * (size_t)t + (size_t)i]];
+		c.triangle = t;
 		c.material = mesh->triangle_material[t];
-		n_parts = fmax(ceil(measure_sides(&c, corners.is_open[t]) / options->cell), 1);
+		c.delta = options->delta_of != NULL ? options->delta_of[c.material] : options->delta;
+		size = options->delta_of != NULL ? fmin(options->cell, (double)c.delta) : options->cell;
+		n_parts = fmax(ceil(measure_sides(&c, corners.is_open[t]) / size), 1);
 		c.n = (uint32_t)fmin(n_parts, MOST_CUT);
 		n_pieces += (uint64_t)c.n * c.n;
 		if (n_parts > MOST_CUT || n_pieces > MOST_PIECES)
 			rc = psr_fail(err, PSR_ERR_LIMIT,
 			              "the mesh has more than %u pieces of %g, or a triangle has sides of more than %d; make them"
-			              " larger", MOST_PIECES, options->cell, MOST_CUT);
+			              " larger", MOST_PIECES, size, MOST_CUT);
 		if (rc == PSR_OK)
 			rc = cut(&c);
 		for (int i = 0; i < 3 && rc == PSR_OK; i++)

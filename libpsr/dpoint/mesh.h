@@ -9,6 +9,11 @@ struct dpoint_mesh_options {
 	double origin[3], scale; /* inner units are (place - origin) * scale */
 	double cell;             /* triangles are cut into cells of sides of at most this, in inner units */
 	float delta;             /* the most that a rectangle may reach: 0 < delta <= 1 */
+	const float *delta_of;   /* the same by material, of which cells have at most the size; NULL: `delta` */
+	/* Tells the attributes of the place v0 + u (v1 - v0) + v (v2 - v0) of a triangle, without a normal. Returns 0 where
+	 * there is no surface: then there is no cell. NULL: attributes are 0. */
+	int (*look)(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr);
+	void *userdata;
 };
 
 /* Adds a candidate and a cell for each piece of a triangle, with the shape of its corners' curvatures between them.

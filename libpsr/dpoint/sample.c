@@ -27,7 +27,8 @@ static int local_at(struct dpoint_local *local, const struct sampling *s, double
 static int put_candidates(const struct sampling *s)
 {
 	const uint32_t n = s->uniform->n, cells = s->uniform->cells, first = (uint32_t)s->surface->n_cells;
-	struct dpoint_candidate like = { .delta = { s->uniform->delta, s->uniform->delta }, .part = s->uniform->part };
+	struct dpoint_candidate like = { .delta = { s->uniform->delta, s->uniform->delta }, .part = s->uniform->part,
+		                             .point.attr = s->uniform->attr };
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < n && rc == PSR_OK; i++)
@@ -71,6 +72,7 @@ static int put_cells(const struct sampling *s)
 			memcpy(cell->corner[2], row[j + 1], sizeof *row);
 			memcpy(cell->corner[3], before[j + 1], sizeof *row);
 			cell->part = s->uniform->part;
+			cell->attr = s->uniform->attr;
 			memset(cell->normal, 0, sizeof cell->normal);
 			if (local_at(&local, s, (i - 0.5) / n, (j + 0.5) / n))
 				for (int k = 0; k < 3; k++)

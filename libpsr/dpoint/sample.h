@@ -12,6 +12,7 @@ struct dpoint_uniform {
 	double origin[3], scale;
 	float delta;
 	uint32_t part;
+	uint64_t attr; /* of all points, without a normal */
 };
 int dpoint_sample_uniform(struct dpoint_surface *surface, const struct dpoint_patch *patch,
                           const struct dpoint_uniform *uniform);

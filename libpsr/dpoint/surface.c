@@ -47,6 +47,7 @@ int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local
 	candidate = dpoint_surface_candidate(surface);
 	if (candidate == NULL)
 		return PSR_ERR_MEMORY;
+	point.attr = like->point.attr;
 	*candidate = *like;
 	dpoint_pack(&word, &point, &box);
 	dpoint_unpack(&candidate->point, &word, &box);

@@ -13,6 +13,7 @@ struct dpoint_cell {
 	float corner[4][3];
 	float normal[3];   /* in its middle, of unit length; 0,0,0 where there is none, at poles */
 	uint32_t part;     /* of the source: a patch, a material; or DPOINT_BEYOND */
+	uint64_t attr;     /* of points in it, without a normal */
 };
 
 /* The part of a cell that is no surface: the strip beside a border, which no rectangle may be over (dpoint_fit()), and
@@ -41,7 +42,7 @@ struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface);
 struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface);
 
 /* Adds the candidate of a local shape, rounded to what a word holds but for its place; counts what is left out. NULL:
- * there is no shape. like: its delta, part and cell. MEMORY. */
+ * there is no shape. like: its delta, part, cell and attributes. MEMORY. */
 int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local,
                        const struct dpoint_candidate *like);
 

@@ -78,6 +78,11 @@ static const struct study_kind tables[] = {
 	{ "dpoint", "[K] table 1", "differential points: simplification", table_dpoint, "teapot",
 	  "kB: [K]'s points have 62 bytes, ours 16, and fitted ones are in groups. Errors, in degrees and radii\n"
 	  "of the model, are those of each kept point at each place that it covers; holes: what no point covers.", NULL },
+	{ "dpoint-frames", "[K] 6", "differential points beside blocks, at magnifications", table_dpoint_frames,
+	  "teapot,toybird",
+	  "Pictures of 800x600 with one light, roughness 0.25. A size is how many pixels of the picture are one that the\n"
+	  "models are for. kB: in memory. dB: to the ray-traced source, inside the object; bright: of its bright pixels.\n"
+	  "Holes are pixels; leaks, and blocks' holes and leaks, are a million pixels'.", NULL },
 	{ "dpoint-meshes", "[K] 4.1", "differential points of meshes", table_dpoint_meshes, "top,teapot,toybird,gavel",
 	  "Rectangles are fitted to 4 degrees and 0.002 radii; pieces: of triangles, no longer than 0.02 radii;\n"
 	  "bad: corners without a curvature, and pieces without a normal. No place is left uncovered.", NULL },

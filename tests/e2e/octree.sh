@@ -99,7 +99,7 @@ refuses "levels for blocks of a mesh" 2 "add --representation octree" \
 	psr-model build "$work/mesh.glb" --levels 7 -o "$work/none.psr"
 refuses "levels for blocks of a cloud" 2 "add --representation octree" \
 	psr-model build "$work/ball.las" --representation blocks --levels 7 -o "$work/none.psr"
-refuses "another representation" 2 "it is blocks, octree or both" \
+refuses "another representation" 2 "it is blocks, octree, both or dpoints" \
 	psr-model build "$work/ball.las" --representation trees -o "$work/none.psr"
 refuses "a spacing that takes too many levels" 2 "more than 20 levels" \
 	psr-model build "$work/ball.las" --representation octree --spacing 1e-9 -o "$work/none.psr"

@@ -26,6 +26,7 @@ libpsr/surface
 libpsr/ray
 libpsr/measure
 libpsr/sample/octree
+libpsr/sample/dpoint
 libpsr/sample/project
 libpsr/sample/visible
 libpsr/sample/own

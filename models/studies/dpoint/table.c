@@ -51,7 +51,7 @@ static const struct row rows[] = {
 static int sample_teapot(struct dpoint_surface *surface, const struct row *row)
 {
 	static const double bezier[8] = { 0, 0, 0, 0, 1, 1, 1, 1 };
-	struct dpoint_uniform uniform = { row->side, row->cells, { 0.2, 1.575, 0 }, 1 / 3.75, row->delta, 0 };
+	struct dpoint_uniform uniform = { row->side, row->cells, { 0.2, 1.575, 0 }, 1 / 3.75, row->delta, 0, 0 };
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < TEAPOT_PATCHES && rc == PSR_OK; i++) {

@@ -72,7 +72,7 @@ static void cube_mesh(struct grid_mesh *m)
 
 static void sample(struct dpoint_surface *surface, const struct grid_mesh *m, double cell, float delta)
 {
-	const struct dpoint_mesh_options options = { { 0, 0, 0 }, 1, cell, delta };
+	const struct dpoint_mesh_options options = { .scale = 1, .cell = cell, .delta = delta };
 
 	dpoint_surface_init(surface);
 	assert_int_equal(dpoint_sample_mesh(surface, &m->mesh, &options, NULL), PSR_OK);
@@ -176,7 +176,7 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 	struct dpoint_surface surface;
 	struct revolved torus;
 	size_t n = 0;
-	const struct dpoint_uniform uniform = { 10, 2, { 0, 0, 0 }, 1, 0.5f, 0 };
+	const struct dpoint_uniform uniform = { 10, 2, { 0, 0, 0 }, 1, 0.5f, 0, 0 };
 
 	(void)state;
 	revolve(&torus, 1, 0.4, 0, 9);
@@ -219,7 +219,7 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 static void two_turns_cover_all_with_little_more(void **state)
 {
 	const struct dpoint_cover_options options = { dpoint_sine(0.03), 1e-5f, 0.06f, 0.01f, 0, OVERHANG };
-	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0 };
+	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0, 0 };
 	struct revolved torus;
 	size_t n_kept[2];
 
@@ -271,7 +271,7 @@ static void mending_leaves_no_hole(void **state)
 
 static void too_many_pieces_are_refused(void **state)
 {
-	const struct dpoint_mesh_options options = { { 0, 0, 0 }, 1, 1e-5, 1 };
+	const struct dpoint_mesh_options options = { .scale = 1, .cell = 1e-5, .delta = 1 };
 	struct grid_mesh *m = malloc(sizeof *m);
 	struct dpoint_surface surface;
 	struct psr_error err;

@@ -1,0 +1,202 @@
+#include "of_mesh.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/clock.h"
+#include "base/vec.h"
+#include "dpoint/mesh.h"
+#include "model/blocks.h"
+#include "sample/octree/of_mesh.h"
+#include "surface/surface.h"
+#include "surface/texture.h"
+#include "surface/validate.h"
+
+#define OVERHANG 5e-4f
+#define SLACK 2e-5f       /* half a step of a place */
+#define SPARSE 4          /* of candidates that come in two turns */
+#define COLORED 0.5       /* pixels that rectangles of colours reach */
+
+void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)
+{
+	*options = (struct dpoint_build_options){ .resolution = resolution, .epsilon = 0.01, .delta = 0.125, .degrees = 2,
+		                                      .height = 1.0 / resolution, .piece = 0.01 };
+}
+
+struct building {
+	const struct psr_mesh *mesh;
+	const struct dpoint_build_options *options;
+	struct psr_error *err;
+	struct psr_model_info *info;
+	struct surface look;
+	uint8_t *two_sided; /* by material */
+	float *delta;       /* likewise */
+	struct dpoint_surface surface;
+};
+
+static void say(const struct building *b, const char *stage)
+{
+	if (b->options->on_progress != NULL)
+		b->options->on_progress(stage, 0, 1, b->options->userdata);
+}
+
+static int check_options(const struct dpoint_build_options *o, struct psr_error *err)
+{
+	if (o->resolution == 0 || !(o->epsilon >= 1e-6 && o->epsilon <= 0.5) || !(o->delta >= 0x1p-15 && o->delta <= 1)
+	    || !(o->degrees >= 0.1 && o->degrees <= 90) || !(o->height > 0) || !(o->piece > 0))
+		return psr_fail(err, PSR_ERR_ARG, "options of differential points are out of range: epsilon %g, delta %g, %g degrees",
+		                o->epsilon, o->delta, o->degrees);
+	return PSR_OK;
+}
+
+/* The look of a place in the middle of a piece, filtered over the piece; *attr without a normal. */
+static int look_at(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr)
+{
+	const struct building *b = userdata;
+	const struct surface_place place = { .prim = triangle, .u = u, .v = v };
+	float normal[3];
+
+	if (b->mesh->material[b->mesh->triangle_material[triangle]].alpha != PSR_ALPHA_OPAQUE
+	    && texture_is_absent(b->mesh, triangle, u, v))
+		return 0;
+	*attr = surface_look(&b->look, &place, 2.0 / b->options->resolution, normal) & ~(uint64_t)PSR_ATTR_NORMAL(UINT64_MAX);
+	return 1;
+}
+
+static int is_opaque_alone(const struct psr_mesh *mesh)
+{
+	for (uint32_t m = 0; m < mesh->n_materials; m++)
+		if (mesh->material[m].alpha != PSR_ALPHA_OPAQUE)
+			return 0;
+	return 1;
+}
+
+/* A closed surface that nothing shows the inside of is seen from outside. */
+static int find_sides(struct building *b)
+{
+	const struct psr_mesh *mesh = b->mesh;
+	uint8_t *is_turned = NULL;
+	int is_closed = 0, n_turned = 0;
+	int rc = octree_mesh_sides(&is_turned, &is_closed, mesh);
+
+	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++)
+		n_turned += is_turned[t];
+	for (uint32_t m = 0; m < mesh->n_materials; m++)
+		b->two_sided[m] = mesh->material[m].two_sided && !(is_closed && n_turned == 0 && is_opaque_alone(mesh));
+	free(is_turned);
+	return rc;
+}
+
+static void find_deltas(struct building *b)
+{
+	for (uint32_t m = 0; m < b->mesh->n_materials; m++) {
+		const int is_plain = b->look.is_plain[m] && b->mesh->color == NULL;
+		const double most = is_plain ? b->options->delta : fmin(b->options->delta, 2 * COLORED / b->options->resolution);
+
+		b->delta[m] = dpoint_delta_of_class(dpoint_delta_class((float)most));
+	}
+}
+
+static int choose(struct building *b, struct dpoint_set *set, struct dpoint_build_report *report)
+{
+	const struct dpoint_build_options *o = b->options;
+	const struct dpoint_mesh_options mesh = {
+		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
+		.cell = o->piece, .delta_of = b->delta, .look = look_at, .userdata = b,
+	};
+	int rc;
+
+	say(b, "sample");
+	rc = dpoint_sample_mesh(&b->surface, b->mesh, &mesh, b->err);
+	if (rc == PSR_OK && b->surface.n_candidates == 0)
+		rc = psr_fail(b->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", b->mesh->n_triangles);
+	if (rc != PSR_OK)
+		return rc;
+	say(b, "choose");
+	rc = dpoint_finish(set, report, &b->surface, b->two_sided, o);
+	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "no memory for the points of %zu pieces", b->surface.n_cells);
+}
+
+int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, struct dpoint_surface *surface,
+                  const uint8_t *two_sided, const struct dpoint_build_options *options)
+{
+	const struct dpoint_cover_options cover_options = {
+		.sine = dpoint_sine(options->epsilon), .slack = SLACK, .angle = (float)(options->degrees * PSR_DEGREE),
+		.height = (float)options->height, .overhang = OVERHANG,
+	};
+	struct dpoint_cover cover = { 0 };
+	struct dpoint_choice choice = { 0 };
+	struct dpoint_errors errors;
+	int rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);
+
+	if (rc == PSR_OK)
+		rc = dpoint_set_make(set, &(struct dpoint_grouping){ surface, &choice, cover_options.sine, two_sided });
+	if (rc == PSR_OK) {
+		dpoint_measure(&errors, surface, &cover, &choice);
+		/* Measured in the middles of pieces, of which corners are further off, before places are rounded. */
+		set->height = (float)fmin(2 * errors.height_worst + (double)SLACK, 2);
+		*report = (struct dpoint_build_report){ surface->n_candidates, choice.n_kept, choice.n_holes, surface->n_bad,
+			                                    errors.normal_rms, errors.normal_worst, errors.height_worst, 0 };
+	}
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	return rc;
+}
+
+static int describe(struct building *b)
+{
+	struct psr_model_info *info = b->info;
+	int rc = validate_mesh(b->mesh, b->err);
+
+	if (rc == PSR_OK)
+		rc = validate_bound_mesh(b->mesh, info->origin, &info->scale, b->err);
+	info->resolution = b->options->resolution;
+	info->spacing = 2 * info->scale / info->resolution;
+	for (int k = 0; k < 3; k++) {
+		info->box_min[k] = INFINITY;
+		info->box_max[k] = -INFINITY;
+	}
+	for (uint32_t t = 0; t < b->mesh->n_triangles && rc == PSR_OK; t++)
+		for (int i = 0; i < 9; i++) {
+			const double x = b->mesh->position[b->mesh->triangle[t][i / 3]][i % 3];
+
+			info->box_min[i % 3] = fmin(info->box_min[i % 3], x);
+			info->box_max[i % 3] = fmax(info->box_max[i % 3], x);
+		}
+	return rc;
+}
+
+int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct dpoint_build_report *report,
+                   const struct psr_mesh *mesh, const struct dpoint_build_options *options, struct psr_error *err)
+{
+	struct building b = { .mesh = mesh, .options = options, .err = err, .info = info };
+	const double begin = clock_seconds();
+	int rc = check_options(options, err);
+
+	memset(set, 0, sizeof *set);
+	if (rc == PSR_OK && mesh->n_triangles == 0)
+		rc = psr_fail(err, PSR_ERR_ARG, "differential points need triangles, and the file has points; build an octree");
+	if (rc == PSR_OK)
+		rc = describe(&b);
+	if (rc != PSR_OK)
+		return rc;
+	dpoint_surface_init(&b.surface);
+	b.two_sided = calloc(mesh->n_materials, 1);
+	b.delta = calloc(mesh->n_materials, sizeof *b.delta);
+	rc = surface_init(&b.look, mesh, info->scale);
+	if (rc == PSR_OK && b.two_sided != NULL && b.delta != NULL)
+		rc = find_sides(&b);
+	else
+		rc = PSR_ERR_MEMORY;
+	if (rc == PSR_OK)
+		find_deltas(&b);
+	rc = rc == PSR_OK ? choose(&b, set, report)
+	                  : psr_fail(err, rc, "no memory for a surface of %u triangles", mesh->n_triangles);
+	if (rc == PSR_OK)
+		report->seconds = clock_seconds() - begin;
+	surface_fini(&b.look);
+	dpoint_surface_fini(&b.surface);
+	free(b.two_sided);
+	free(b.delta);
+	return rc;
+}

@@ -1,0 +1,48 @@
+/* Differential points of meshes ([K] 4). */
+#ifndef PSR_SAMPLE_DPOINT_OF_MESH_H
+#define PSR_SAMPLE_DPOINT_OF_MESH_H
+
+#include "base/pool.h"
+#include "dpoint/group.h"
+#include "psr/mesh.h"
+#include "psr/model.h"
+
+struct dpoint_build_options {
+	uint32_t resolution; /* pixels across the unit sphere: what textures and vertex colours are kept for */
+	double epsilon;      /* of [K] 4.1, 1e-6..0.5 */
+	double delta;        /* the most that a rectangle reaches, inner units: 2^-15..1 */
+	double degrees;      /* normals may be off by so much in the middle of a piece of the surface, 0.1..90 */
+	double height;       /* and heights by so much, inner units; > 0 */
+	double piece;        /* the surface is covered in pieces of this size at most, inner units; > 0 */
+	struct psr_pool *pool; /* may be NULL */
+	/* Called before each step; total is 1. May be NULL. */
+	void (*on_progress)(const char *stage, uint64_t done, uint64_t total, void *userdata);
+	void *userdata;
+};
+void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution);
+
+struct dpoint_build_report {
+	uint64_t n_candidates, n_kept;
+	uint64_t n_open;        /* pieces that no point covers: without an area, or bent as much as their sides are long */
+	uint64_t n_bad;         /* curvatures that could not be told; such places are flat */
+	double normal_rms, normal_worst; /* radians */
+	double height_worst;    /* inner units */
+	double seconds;
+};
+
+/* Chooses points of a mesh's triangles, in inner units of `info`, whose origin, scale, box, spacing and resolution it
+ * fills in. Rectangles end at creases, borders, and where the mesh bends otherwise than they do; those of materials with
+ * textures, or of meshes with colours at their vertices, reach over half a pixel of the resolution. Alpha-tested places
+ * that are not there have no points; surfaces of BLEND materials have those of opaque ones. A closed surface is seen from
+ * its outside alone, another one as its materials say. The caller calls dpoint_set_fini(), on failure too.
+ *
+ * ARG: options out of range, no triangles; FORMAT: nothing is opaque; LIMIT, MEMORY. */
+int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct dpoint_build_report *report,
+                   const struct psr_mesh *mesh, const struct dpoint_build_options *options, struct psr_error *err);
+
+/* The end of it: makes the set of a surface's choice, and its greatest error. two_sided: by part, or NULL. MEMORY,
+ * LIMIT. */
+int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, struct dpoint_surface *surface,
+                  const uint8_t *two_sided, const struct dpoint_build_options *options);
+
+#endif

@@ -1,0 +1,35 @@
+#include "info_points.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+
+static double bytes_of(const struct dpoint_set *set)
+{
+	return (double)sizeof *set->word + (double)sizeof *set->group * set->n_groups / set->n_points;
+}
+
+static double epsilon_of(const struct dpoint_set *set)
+{
+	return 1 - sqrt(1 - (double)set->sine * (double)set->sine);
+}
+
+void info_print_points(const struct dpoint_set *set, double scale)
+{
+	printf("points            %" PRIu32 " differential points in %" PRIu32 " groups, %.1f bytes a point\n", set->n_points,
+	       set->n_groups, bytes_of(set));
+	printf("  epsilon         %.4g\n", epsilon_of(set));
+	printf("  off by          %.3g at most\n", (double)set->height * scale);
+}
+
+cJSON *info_points_json(const struct dpoint_set *set, double scale)
+{
+	cJSON *part = cJSON_CreateObject();
+
+	cJSON_AddNumberToObject(part, "points", set->n_points);
+	cJSON_AddNumberToObject(part, "groups", set->n_groups);
+	cJSON_AddNumberToObject(part, "bytes_per_point", bytes_of(set));
+	cJSON_AddNumberToObject(part, "epsilon", epsilon_of(set));
+	cJSON_AddNumberToObject(part, "height", (double)set->height * scale);
+	return part;
+}

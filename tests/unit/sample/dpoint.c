@@ -1,0 +1,175 @@
+/* Differential points of meshes: few, all over the surface, with its looks and sides. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/direction.h"
+#include "base/vec.h"
+#include "model/blocks.h"
+#include "sample/dpoint/of_mesh.h"
+
+#define AROUND 48
+#define UP 24
+#define RADIUS 3.0
+
+/* A sphere about 10, 0, 0 with the normals of its shape; without a cap if it is open. */
+static struct psr_mesh *sphere(int is_open)
+{
+	double (*position)[3] = malloc(AROUND * (UP + 1) * sizeof *position);
+	uint32_t (*triangle)[3] = malloc(2 * AROUND * UP * sizeof *triangle), n = 0;
+	struct psr_mesh *mesh;
+
+	for (int i = 0; i < AROUND; i++)
+		for (int k = 0; k <= UP; k++) {
+			const double a = 2 * M_PI * i / AROUND, b = M_PI * k / UP;
+
+			v3d_set(position[i * (UP + 1) + k], 10 + RADIUS * sin(b) * cos(a), RADIUS * cos(b), -RADIUS * sin(b) * sin(a));
+		}
+	for (uint32_t i = 0; i < AROUND; i++)
+		for (uint32_t k = is_open ? UP / 4 : 0; k < UP; k++) {
+			const uint32_t j = (i + 1) % AROUND, a = i * (UP + 1) + k, b = j * (UP + 1) + k;
+
+			memcpy(triangle[n++], (const uint32_t[3]){ a, a + 1, b + 1 }, sizeof *triangle);
+			memcpy(triangle[n++], (const uint32_t[3]){ a, b + 1, b }, sizeof *triangle);
+		}
+	assert_int_equal(psr_mesh_create(&mesh, (const double(*)[3])position, AROUND * (UP + 1),
+	                                 (const uint32_t(*)[3])triangle, n, NULL), PSR_OK);
+	free(position);
+	free(triangle);
+	mesh->material[0].two_sided = 1;
+	mesh->material[0].base_color[0] = 0.5f;
+	mesh->material[0].metallic = 1;
+	return mesh;
+}
+
+static void make(struct dpoint_set *set, struct psr_model_info *info, struct dpoint_build_report *report,
+                 const struct psr_mesh *mesh, uint32_t resolution)
+{
+	struct dpoint_build_options options;
+	struct psr_error err = { 0 };
+
+	dpoint_build_options_default(&options, resolution);
+	options.degrees = 6;
+	options.piece = 0.05;
+	options.height = 0.01;
+	*info = (struct psr_model_info){ .scale = 0 };
+	if (dpoint_of_mesh(set, info, report, mesh, &options, &err) != PSR_OK)
+		fail_msg("%s", err.text);
+}
+
+/* The chord of a facet is off the sphere by 1 - cos(pi / UP / 2) of its radius, and normals between corners are as much
+ * off as two facets turn: all points are so near, and two thirds of the pieces are superfluous at least. */
+static void points_lie_on_the_surface_and_are_few(void **state)
+{
+	struct psr_mesh *mesh = sphere(0);
+	struct dpoint_build_report report;
+	struct psr_model_info info;
+	struct dpoint_set set;
+
+	(void)state;
+	make(&set, &info, &report, mesh, 128);
+	assert_true(fabs(info.origin[0] - 10) < 1e-9 && fabs(info.scale - RADIUS) < 1e-4 * RADIUS);
+	assert_true(info.box_min[1] == -RADIUS && info.box_max[1] == RADIUS && info.resolution == 128);
+	assert_int_equal(report.n_kept, set.n_points);
+	assert_int_equal(report.n_open, 0);
+	assert_true(3 * report.n_kept < report.n_candidates);
+	for (uint32_t i = 0; i < set.n_groups; i++)
+		for (uint32_t k = 0; k < set.group[i].n; k++) {
+			struct dpoint p;
+
+			dpoint_unpack(&p, &set.word[set.group[i].first + k], &set.group[i].box);
+			assert_true(fabs((double)v3f_length(p.at) - 1) < 1 - cos(M_PI / UP / 2) + 0.01);
+			/* Where 48 slivers meet, some are mended by points that lean. */
+			assert_true(fabsf(p.at[1]) > 0.98f || v3f_dot(p.at, p.normal) > 0.98f);
+			assert_int_equal(set.group[i].flags, 0); /* it is closed: nobody sees its back */
+			assert_int_equal(PSR_ATTR_METALLIC(p.attr), 31);
+			assert_true(PSR_ATTR_BASE(p.attr) == 0xffffbc); /* 0.5 as sRGB */
+		}
+	dpoint_set_fini(&set);
+	psr_mesh_destroy(mesh);
+}
+
+static void an_open_surface_is_seen_from_the_sides_that_its_material_has(void **state)
+{
+	(void)state;
+	for (int two_sided = 0; two_sided < 2; two_sided++) {
+		struct psr_mesh *mesh = sphere(1);
+		struct dpoint_build_report report;
+		struct psr_model_info info;
+		struct dpoint_set set;
+
+		mesh->material[0].two_sided = two_sided;
+		make(&set, &info, &report, mesh, 128);
+		for (uint32_t i = 0; i < set.n_groups; i++)
+			assert_int_equal(set.group[i].flags, two_sided ? DPOINT_TWO_SIDED : 0);
+		dpoint_set_fini(&set);
+		psr_mesh_destroy(mesh);
+	}
+}
+
+/* Colours at vertices keep rectangles to half a pixel. */
+static void colours_keep_their_points(void **state)
+{
+	struct psr_mesh *mesh = sphere(0);
+	struct dpoint_build_report report;
+	struct psr_model_info info;
+	struct dpoint_set set;
+
+	(void)state;
+	mesh->color = malloc(mesh->n_vertices * sizeof *mesh->color);
+	for (uint32_t v = 0; v < mesh->n_vertices; v++)
+		for (int c = 0; c < 4; c++)
+			mesh->color[v][c] = c == 3 || mesh->position[v][1] > 0 ? 1 : 0;
+	make(&set, &info, &report, mesh, 16);
+	for (uint32_t i = 0; i < set.n_groups; i++)
+		for (uint32_t k = 0; k < set.group[i].n; k++) {
+			struct dpoint p;
+
+			dpoint_unpack(&p, &set.word[set.group[i].first + k], &set.group[i].box);
+			assert_true(dpoint_delta_of_class(set.group[i].delta[0]) <= 1.2f / 16);
+			/* Between the rings of vertices beside the equator the colour goes from one to the other. */
+			if (fabsf(p.at[1]) > 2.0f / UP * (float)M_PI / 2 + 0.08f)
+				assert_true((PSR_ATTR_BASE(p.attr) & 255) == (p.at[1] > 0 ? 0xbc : 0));
+		}
+	dpoint_set_fini(&set);
+	psr_mesh_destroy(mesh);
+}
+
+static void what_cannot_be_is_refused(void **state)
+{
+	struct psr_mesh *mesh = sphere(1);
+	struct dpoint_build_options options;
+	struct dpoint_build_report report;
+	struct psr_model_info info;
+	struct psr_error err;
+	struct dpoint_set set;
+
+	(void)state;
+	dpoint_build_options_default(&options, 128);
+	options.epsilon = 0;
+	assert_int_equal(dpoint_of_mesh(&set, &info, &report, mesh, &options, &err), PSR_ERR_ARG);
+	options.epsilon = NAN;
+	assert_int_equal(dpoint_of_mesh(&set, &info, &report, mesh, &options, &err), PSR_ERR_ARG);
+	dpoint_build_options_default(&options, 128);
+	mesh->material[0].alpha = PSR_ALPHA_MASK;
+	mesh->material[0].alpha_cutoff = 2;
+	assert_int_equal(dpoint_of_mesh(&set, &info, &report, mesh, &options, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "nothing of the surface"));
+	psr_mesh_destroy(mesh);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(points_lie_on_the_surface_and_are_few),
+		cmocka_unit_test(an_open_surface_is_seen_from_the_sides_that_its_material_has),
+		cmocka_unit_test(colours_keep_their_points),
+		cmocka_unit_test(what_cannot_be_is_refused),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
