@@ -118,6 +118,7 @@ static void copy_row(uint8_t *to, const uint8_t *from, uint32_t width, uint32_t 
 	}
 	switch (pixel) {
 	case 1: enlarge_row(to, from, width, scale, 1); break;
+	case 2: enlarge_row(to, from, width, scale, 2); break;
 	case 3: enlarge_row(to, from, width, scale, 3); break;
 	case 4: enlarge_row(to, from, width, scale, 4); break;
 	case 6: enlarge_row(to, from, width, scale, 6); break;

@@ -25,9 +25,9 @@ struct surveyor; /* memory of surveys; one thread at a time */
 struct surveyor *surveyor_create(void); /* NULL without memory */
 void surveyor_destroy(struct surveyor *surveyor); /* NULL is fine */
 
-/* Surveys a valid scene, whose models are there, in a picture of this size; lights do not matter. Fills at[0..n-1] for
- * densities > 0, n at most SURVEY_MOST. Returns 0 if the scene has too many clusters, or there is no memory: then nothing
- * is known. */
+/* Surveys a scene that psr_scene_validate() took, whose models are there, in a picture of this size; lights do not
+ * matter. Fills at[0..n-1] for densities > 0, n at most SURVEY_MOST. Returns 0 if the scene has too many clusters, or
+ * there is no memory: then nothing is known. */
 int survey_scene(struct survey *survey, struct surveyor *surveyor, const struct psr_scene *scene, uint32_t width,
                  uint32_t height, const double *density, int n);
 

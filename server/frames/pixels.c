@@ -48,11 +48,12 @@ void pixels_enlarge(uint8_t *out, const uint8_t *in, uint32_t width, uint32_t he
 	for (uint32_t y = 0; y < height; y++, in += row, out += scale * large) {
 		switch (pixel_bytes) {
 		case 1: enlarge_row(out, in, width, 1, scale); break;
+		case 2: enlarge_row(out, in, width, 2, scale); break;
 		case 3: enlarge_row(out, in, width, 3, scale); break;
 		case 4: enlarge_row(out, in, width, 4, scale); break;
 		case 6: enlarge_row(out, in, width, 6, scale); break;
 		case 8: enlarge_row(out, in, width, 8, scale); break;
-		default: assert(!"pixels have 1, 3, 4, 6 or 8 bytes");
+		default: assert(!"pixels have 1, 2, 3, 4, 6 or 8 bytes");
 		}
 		for (uint32_t k = 1; k < scale; k++)
 			memcpy(out + k * large, out, large);

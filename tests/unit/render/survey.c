@@ -64,6 +64,7 @@ static void look(struct psr_scene *scene, const struct psr_instance *instance, u
 		scene->camera.target[k] = info->box_min[k] / 2 + info->box_max[k] / 2;
 		scene->camera.eye[k] = scene->camera.target[k] + away * toward[k];
 	}
+	assert_int_equal(psr_scene_validate(scene, NULL), PSR_OK);
 }
 
 static void draw(struct psr_report *report, const struct psr_scene *scene, double spacing)

@@ -303,7 +303,7 @@ static void parts_take_the_bytes_that_were_said(void **state)
 	(void)state;
 	assert_true(codec_parts_bytes(128, 32, 1) == sizeof(struct codec_parts) + 9);
 	assert_true(codec_parts_bytes(129, 33, 3) == sizeof(struct codec_parts) + 2 * 4 * 9);
-	assert_true(codec_parts_bytes(16384, 4096, TRIP_ALL) == sizeof(struct codec_parts) + UINT64_C(7) * 128 * 128 * 9);
+	assert_true(codec_parts_bytes(16384, 4096, TRIP_ALL) == sizeof(struct codec_parts) + UINT64_C(8) * 128 * 128 * 9);
 }
 
 int main(void)
