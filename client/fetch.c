@@ -93,7 +93,8 @@ static int print_result(const struct fetching *f, struct psr_error *err)
 	else
 		printf("%s: the first %.2f of %.2f MB", f->output, (double)facts->n_taken * 1e-6, (double)facts->n_file * 1e-6);
 	if (step != NULL)
-		printf(", level %d of %d, %" PRIu64 " points", step->depth, facts->step[facts->n_steps - 1].depth, step->n_leaves);
+		printf(", level %d of %d, %" PRIu64 " points", step->depth, facts->step[facts->n_steps - 1].depth,
+		       step->n_leaves);
 	printf("; %.2f MB fetched\n", (double)(facts->n_taken - f->start_bytes) * 1e-6);
 	return outfile_flush_stdout(err);
 }
@@ -281,7 +282,8 @@ static int fetch(struct fetching *f, struct psr_error *err)
 {
 	const struct wish *wish = f->wish;
 	struct psr_client *client = NULL;
-	int is_done = 0, code = psr_client_connect(&client, wish->server, PSR_PROGRAM, wish->model, (int)wish->timeout * 1000, err);
+	const int patience_ms = (int)wish->timeout * 1000;
+	int is_done = 0, code = psr_client_connect(&client, wish->server, PSR_PROGRAM, wish->model, patience_ms, err);
 
 	if (code != PSR_OK)
 		return code;

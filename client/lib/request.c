@@ -43,7 +43,8 @@ int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scen
 			                client->welcome.server);
 	for (unsigned i = 0; code == PSR_OK && i < scene->n_instances && i < PSR_WIRE_MAX_INSTANCES; i++) {
 		const unsigned kind = scene->instance[i].representation;
-		const uint32_t needs = kind == PSR_WIRE_REP_OCTREE ? PSR_CAP_OCTREE : kind == PSR_WIRE_REP_DPOINT ? PSR_CAP_DPOINT : 0;
+		const uint32_t needs = kind == PSR_WIRE_REP_OCTREE ? PSR_CAP_OCTREE
+		                       : kind == PSR_WIRE_REP_DPOINT ? PSR_CAP_DPOINT : 0;
 
 		if ((client->welcome.capabilities & needs) != needs)
 			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no %s (%s)", client->address,

@@ -172,12 +172,14 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 		        notes->least_pass, asked->pass_limit);
 	if (notes->n_over > 0 && notes->n_pictures > 1)
 		fprintf(stderr, "%s: %u of %u pictures are over the budget\n", program, notes->n_over, notes->n_pictures);
-	if (model != NULL && model->opened.representations != 1u << PSR_WIRE_REP_DPOINT && notes->coarsest > ROUGH && asked->settings.spacing_px < DRAFT) {
+	/* Differential points have no resolution. */
+	if (model != NULL && model->opened.representations != 1u << PSR_WIRE_REP_DPOINT && notes->coarsest > ROUGH
+	    && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
 		if (!(model->opened.representations >> PSR_WIRE_REP_BLOCKS & 1))
-			fprintf(stderr, "%s: %s is an octree for %u pixels; edges will look rough here; %.0f more --levels help if its "
-			        "file is finer\n", program, model->name, model->opened.resolution, ceil(log2(notes->coarsest)));
+			fprintf(stderr, "%s: %s is an octree for %u pixels; edges will look rough here; %.0f more --levels help "
+			        "if its file is finer\n", program, model->name, model->opened.resolution, ceil(log2(notes->coarsest)));
 		else if (resolution <= MOST)
 			fprintf(stderr, "%s: %s is sampled for %u pixels; edges will look rough here; build it with -r %.0f\n",
 			        program, model->name, model->opened.resolution, resolution);
