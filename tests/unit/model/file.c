@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include "model/file.h"
 #include "fixture.h"
+#include "sections.h"
 
 static struct fixture fixture;
 static uint8_t *image; /* of the fixture less its visibility, so that there is padding after the table too */
@@ -51,15 +52,6 @@ static int parse(const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 	code = file_parse(exact, n_bytes, NULL, "m.psr", &content, err);
 	free(exact);
 	return code;
-}
-
-static uint8_t *entry_of(uint8_t *bytes, const char *type)
-{
-	for (uint32_t i = 0; i < file_get(bytes + HEADER_N_SECTIONS, 4); i++)
-		if (memcmp(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, type, 4) == 0)
-			return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
-	fail_msg("no section %s", type);
-	return NULL;
 }
 
 static void assert_same(const struct psr_model *model, int with_optional)

@@ -10,6 +10,7 @@
 #include "model/file.h"
 #include "../octree/leaves.h"
 #include "fixture.h"
+#include "sections.h"
 
 #define LEVELS 7
 
@@ -211,24 +212,6 @@ static void what_is_no_octree_makes_no_model(void **state)
 }
 
 /* ---- files ---- */
-
-static uint8_t *entry_of(uint8_t *bytes, const char *type)
-{
-	for (uint32_t i = 0; i < file_get(bytes + HEADER_N_SECTIONS, 4); i++)
-		if (memcmp(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, type, 4) == 0)
-			return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
-	fail_msg("no section %s", type);
-	return NULL;
-}
-
-static uint8_t *copy_of(const struct psr_model *model, size_t *n)
-{
-	const uint8_t *image = model_image(model, n);
-	uint8_t *copy = malloc(*n);
-
-	memcpy(copy, image, *n);
-	return copy;
-}
 
 static void lies_in_sections_of_octrees_are_refused(void **state)
 {

@@ -10,6 +10,7 @@
 #include "base/mem.h"
 #include "model/pack.h"
 #include "fixture.h"
+#include "sections.h"
 
 static struct psr_model *small; /* the fixture with everything */
 static uint8_t *packed;
@@ -268,15 +269,6 @@ static void a_flipped_bit_of_a_packed_file_is_noticed(void **state)
 			packed[i] ^= (uint8_t)(1 << bit);
 		}
 	}
-}
-
-static uint8_t *entry_of(uint8_t *bytes, const char *type)
-{
-	for (uint32_t i = 0; i < file_get(bytes + HEADER_N_SECTIONS, 4); i++)
-		if (memcmp(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, type, 4) == 0)
-			return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
-	fail_msg("no section %s", type);
-	return NULL;
 }
 
 /* The small model has one chunk a section: its directory entry. */

@@ -8,6 +8,7 @@
 #include "model/pack.h"
 #include "../octree/leaves.h"
 #include "fixture.h"
+#include "sections.h"
 
 #define LEVELS 5
 
@@ -190,15 +191,6 @@ static void flipped_bits_are_noticed_with_or_without_right_hashes(void **state)
 		psr_model_unref(model);
 	}
 	free(bytes);
-}
-
-static uint8_t *entry_of(uint8_t *bytes, const char *type)
-{
-	for (uint32_t i = 0; i < file_get(bytes + HEADER_N_SECTIONS, 4); i++)
-		if (memcmp(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, type, 4) == 0)
-			return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
-	fail_msg("no section %s", type);
-	return NULL;
 }
 
 /* The entry of the octree in the directory. */

@@ -10,6 +10,7 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "fixture.h"
+#include "sections.h"
 #include "model/file.h"
 
 static struct fixture fixture;
@@ -157,24 +158,6 @@ static void what_is_no_set_makes_no_model(void **state)
 }
 
 /* ---- files ---- */
-
-static uint8_t *entry_of(uint8_t *bytes, const char *type)
-{
-	for (uint32_t i = 0; i < file_get(bytes + HEADER_N_SECTIONS, 4); i++)
-		if (memcmp(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, type, 4) == 0)
-			return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
-	fail_msg("no section %s", type);
-	return NULL;
-}
-
-static uint8_t *copy_of(const struct psr_model *model, size_t *n)
-{
-	const uint8_t *image = model_image(model, n);
-	uint8_t *copy = malloc(*n);
-
-	memcpy(copy, image, *n);
-	return copy;
-}
 
 static void lies_are_refused(void **state)
 {

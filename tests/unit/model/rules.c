@@ -5,6 +5,7 @@
 #include <cmocka.h>
 #include "model/file.h"
 #include "fixture.h"
+#include "sections.h"
 
 /* IEEE 754 bits */
 #define F_NAN 0x7fc00000u
@@ -40,15 +41,6 @@ static int teardown(void **state)
 	(void)state;
 	free(original);
 	return 0;
-}
-
-static uint8_t *entry_of(uint8_t *bytes, const char *type)
-{
-	for (uint32_t i = 0; i < file_get(bytes + HEADER_N_SECTIONS, 4); i++)
-		if (memcmp(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, type, 4) == 0)
-			return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
-	fail_msg("no section %s", type);
-	return NULL;
 }
 
 static uint8_t *copy_original(void)
