@@ -63,20 +63,6 @@ static int teardown(void **state)
 	return 0;
 }
 
-/* From an allocation of exactly that size, so that the address sanitizer sees every step beyond it. */
-static int parse(struct psr_model **model, const uint8_t *bytes, size_t n, struct psr_error *err)
-{
-	uint8_t *exact = malloc(n > 0 ? n : 1);
-	int code;
-
-	memcpy(exact, bytes, n);
-	*model = NULL;
-	code = psr_model_parse(model, exact, n, err);
-	assert_true((code == PSR_OK) == (*model != NULL));
-	free(exact);
-	return code;
-}
-
 static void assert_same_image(const struct psr_model *a, const struct psr_model *b)
 {
 	size_t n_a, n_b;
@@ -96,7 +82,7 @@ static void it_unpacks_to_the_plain_file(void **state)
 		uint8_t *bytes = pack(models[i], &n);
 
 		assert_int_equal(file_get(bytes + HEADER_PACKING, 4), PACKING_OCTREE);
-		assert_int_equal(parse(&model, bytes, n, NULL), PSR_OK);
+		assert_int_equal(parse_exact(&model, bytes, n, NULL), PSR_OK);
 		assert_same_image(model, models[i]);
 		assert_true(psr_model_octree_shares(model, &shares));
 		assert_true(shares.codes > 0 && shares.stream[0] > 0 && shares.stream[1] > 0 && shares.stream[2] > 0);
@@ -122,7 +108,7 @@ static void many_chunks_and_pieces_come_back_with_threads(void **state)
 	octree_destroy(large);
 	bytes = pack(model, &n);
 	assert_true(n / 4 > FILE_CHUNK_BYTES / 8);
-	assert_int_equal(parse(&again, bytes, n, NULL), PSR_OK);
+	assert_int_equal(parse_exact(&again, bytes, n, NULL), PSR_OK);
 	assert_same_image(again, model);
 	psr_model_unref(model);
 	psr_model_unref(again);
@@ -151,7 +137,7 @@ static void what_packs_beyond_belief_is_stored(void **state)
 	bytes = pack(model, &n);
 	model_image(model, &n_image);
 	assert_true(n_image <= pack_max_image(n));
-	assert_int_equal(parse(&again, bytes, n, NULL), PSR_OK);
+	assert_int_equal(parse_exact(&again, bytes, n, NULL), PSR_OK);
 	assert_same_image(again, model);
 	psr_model_unref(model);
 	psr_model_unref(again);
@@ -165,7 +151,7 @@ static void a_file_cut_at_any_length_is_refused(void **state)
 		struct psr_error err = { .text = "" };
 		struct psr_model *model;
 
-		assert_int_equal(parse(&model, packed, n, &err), PSR_ERR_FORMAT);
+		assert_int_equal(parse_exact(&model, packed, n, &err), PSR_ERR_FORMAT);
 		assert_true(err.text[0] != 0);
 	}
 }
@@ -181,10 +167,10 @@ static void flipped_bits_are_noticed_with_or_without_right_hashes(void **state)
 
 		memcpy(bytes, packed, n_packed);
 		bytes[at] ^= 1 << at % 8;
-		assert_int_equal(parse(&model, bytes, n_packed, NULL), PSR_ERR_FORMAT);
+		assert_int_equal(parse_exact(&model, bytes, n_packed, NULL), PSR_ERR_FORMAT);
 		/* The plain file's hashes are there still. */
 		pack_seal(bytes, n_packed);
-		code = parse(&model, bytes, n_packed, NULL);
+		code = parse_exact(&model, bytes, n_packed, NULL);
 		assert_true(code == PSR_OK || code == PSR_ERR_FORMAT || code == PSR_ERR_UNSUPPORTED || code == PSR_ERR_VERSION);
 		if (code == PSR_OK && memcmp(bytes, packed, n_packed) != 0)
 			fail_msg("bit %zu of byte %zu may have any value", at % 8, at);
@@ -242,7 +228,7 @@ static void lies_are_refused_even_under_right_hashes(void **state)
 		file_put((lies[i].section != NULL ? entry_of(bytes, lies[i].section) : octree_of(bytes)) + lies[i].at,
 		         lies[i].size, lies[i].value);
 		pack_seal(bytes, n_packed);
-		assert_int_equal(parse(&model, bytes, n_packed, &err), PSR_ERR_FORMAT);
+		assert_int_equal(parse_exact(&model, bytes, n_packed, &err), PSR_ERR_FORMAT);
 		if (strstr(err.text, lies[i].text) == NULL && lies[i].at != ENTRY_TYPE && lies[i].at != ENTRY_VERSION)
 			fail_msg("lie %zu: '%s' instead of '%s'", i, err.text, lies[i].text);
 		free(bytes);
@@ -260,7 +246,7 @@ static void counts_of_another_version_are_not_believed(void **state)
 	memcpy(entry_of(bytes, "ONRM"), "OCTR", 4);
 	file_put(entry_of(bytes, "OCTR") + ENTRY_VERSION, 2, 7);
 	pack_seal(bytes, n_packed);
-	assert_int_equal(parse(&model, bytes, n_packed, NULL), PSR_ERR_FORMAT);
+	assert_int_equal(parse_exact(&model, bytes, n_packed, NULL), PSR_ERR_FORMAT);
 	free(bytes);
 }
 

@@ -10,6 +10,7 @@
 #include "model/pack.h"
 #include "../octree/leaves.h"
 #include "fixture.h"
+#include "sections.h"
 
 #define LEVELS 7
 
@@ -85,20 +86,6 @@ static int teardown(void **state)
 	return 0;
 }
 
-/* From an allocation of exactly that size, so that the address sanitizer sees every step beyond it. */
-static int parse(struct psr_model **model, const uint8_t *bytes, size_t n, struct psr_error *err)
-{
-	uint8_t *exact = malloc(n > 0 ? n : 1);
-	int code;
-
-	memcpy(exact, bytes, n);
-	*model = NULL;
-	code = psr_model_parse(model, exact, n, err);
-	assert_true((code == PSR_OK) == (*model != NULL));
-	free(exact);
-	return code;
-}
-
 static void assert_tree(const struct octree *a, const struct octree *b)
 {
 	assert_int_equal(a->levels, b->levels);
@@ -130,7 +117,7 @@ static void a_file_cut_at_any_length_is_its_coarser_model_or_refused(void **stat
 			struct psr_error err = { .text = "" };
 			struct psr_model_prefix prefix;
 			struct psr_model *model;
-			const int n_whole = steps_in(n, i), code = parse(&model, packed[i], n, &err);
+			const int n_whole = steps_in(n, i), code = parse_exact(&model, packed[i], n, &err);
 
 			if (code != (n_whole > 0 ? PSR_OK : PSR_ERR_FORMAT))
 				fail_msg("%zu of %zu bytes, %d steps: %d, %s", n, n_packed[i], n_whole, code, err.text);
@@ -159,7 +146,7 @@ static void its_model_is_that_of_the_coarser_tree(void **state)
 		uint8_t id[16], other[16];
 
 		assert_true(n < n_packed[i]);
-		assert_int_equal(parse(&model, packed[i], n, NULL), PSR_OK);
+		assert_int_equal(parse_exact(&model, packed[i], n, NULL), PSR_OK);
 		if (i == 0) {
 			info.spacing *= 1 << missing;
 			info.resolution = info.resolution >> missing > 0 ? info.resolution >> missing : 1;
@@ -173,7 +160,7 @@ static void its_model_is_that_of_the_coarser_tree(void **state)
 		assert_int_equal(psr_model_blocks(model) != NULL, i == 1);
 		psr_model_unref(model);
 		psr_model_unref(made);
-		assert_int_equal(parse(&model, packed[i], n_packed[i], NULL), PSR_OK);
+		assert_int_equal(parse_exact(&model, packed[i], n_packed[i], NULL), PSR_OK);
 		assert_false(psr_model_is_prefix(model, &prefix));
 		psr_model_unref(model);
 	}
@@ -212,10 +199,10 @@ static void a_piece_that_is_damaged_is_named(void **state)
 
 	(void)state;
 	packed[0][n - 5] ^= 16;
-	assert_int_equal(parse(&model, packed[0], n, &err), PSR_ERR_FORMAT);
+	assert_int_equal(parse_exact(&model, packed[0], n, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "the packed octree is damaged at byte"));
 	/* One byte less, and that piece is not there. */
-	assert_int_equal(parse(&model, packed[0], n - 1, &err), PSR_OK);
+	assert_int_equal(parse_exact(&model, packed[0], n - 1, &err), PSR_OK);
 	psr_model_unref(model);
 	packed[0][n - 5] ^= 16;
 }
@@ -251,7 +238,7 @@ static void lies_are_refused_even_under_right_hashes(void **state)
 		memcpy(bytes, packed[0], n_packed[0]);
 		file_put(bytes + lies[i].at, lies[i].size, lies[i].value);
 		pack_seal(bytes, n_packed[0]);
-		assert_int_equal(parse(&model, bytes, n, &err), PSR_ERR_FORMAT);
+		assert_int_equal(parse_exact(&model, bytes, n, &err), PSR_ERR_FORMAT);
 		if (strstr(err.text, lies[i].text) == NULL)
 			fail_msg("lie %zu: '%s' instead of '%s'", i, err.text, lies[i].text);
 		free(bytes);
@@ -270,7 +257,7 @@ static void a_huge_rest_is_not_believed(void **state)
 	file_put(bytes + HEADER_PACKED_SIZE, 8, UINT64_MAX / 128);
 	file_put(bytes + HEADER_N_CHUNKS, 4, UINT32_MAX);
 	pack_seal(bytes, n_packed[0]);
-	assert_int_equal(parse(&model, bytes, n_packed[0] - 1, &err), PSR_ERR_FORMAT);
+	assert_int_equal(parse_exact(&model, bytes, n_packed[0] - 1, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "within its section table"));
 	memcpy(bytes, packed[0], n_packed[0]);
 	file_put(bytes + HEADER_PACKED_SIZE, 8, UINT64_MAX / 128);
@@ -279,7 +266,7 @@ static void a_huge_rest_is_not_believed(void **state)
 	while (file_get(bytes + table_end, 8) != n_packed[0] - octree_at[0])
 		table_end += PACK_ENTRY_BYTES;
 	file_put(bytes + table_end, 8, UINT64_MAX / 256);
-	assert_int_equal(parse(&model, bytes, n_packed[0] - 1, &err), PSR_ERR_FORMAT);
+	assert_int_equal(parse_exact(&model, bytes, n_packed[0] - 1, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "within its directory of chunks"));
 	free(bytes);
 }

@@ -26,4 +26,18 @@ static inline uint8_t *copy_of(const struct psr_model *model, size_t *n)
 	return copy;
 }
 
+/* From an allocation of exactly that size, so that the address sanitizer sees every step beyond it. */
+static inline int parse_exact(struct psr_model **model, const uint8_t *bytes, size_t n, struct psr_error *err)
+{
+	uint8_t *exact = malloc(n > 0 ? n : 1);
+	int code;
+
+	memcpy(exact, bytes, n);
+	*model = NULL;
+	code = psr_model_parse(model, exact, n, err);
+	assert_true((code == PSR_OK) == (*model != NULL));
+	free(exact);
+	return code;
+}
+
 #endif

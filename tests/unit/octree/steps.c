@@ -50,23 +50,6 @@ static int unpack(struct octree **tree, const uint8_t *bytes, size_t n)
 	return rc;
 }
 
-static void assert_same(const struct octree *a, const struct octree *b)
-{
-	assert_int_equal(a->levels, b->levels);
-	assert_int_equal(a->n_codes, b->n_codes);
-	assert_int_equal(a->n_leaves, b->n_leaves);
-	assert_int_equal(a->n_skips, b->n_skips);
-	assert_memory_equal(a->code, b->code, a->n_codes);
-	assert_memory_equal(a->skip, b->skip, a->n_skips * sizeof *a->skip);
-	assert_true(!a->normal == !b->normal && !a->offset == !b->offset && !a->color == !b->color);
-	if (a->normal != NULL)
-		assert_memory_equal(a->normal, b->normal, a->n_leaves * sizeof *a->normal);
-	if (a->offset != NULL)
-		assert_memory_equal(a->offset, b->offset, a->n_leaves);
-	if (a->color != NULL)
-		assert_memory_equal(a->color, b->color, a->n_leaves * sizeof *a->color);
-}
-
 /* Unpacks each beginning that is a tree, and compares it with what the tree itself becomes. */
 static void assert_beginnings(const struct packed *p)
 {
