@@ -6,10 +6,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "answers.h"
+#include "model/file.h"
 #include "server/models/cache.h"
 
-#define HEADER_BYTES 64 /* of a .psr file (docs/format.md) */
-#define HEADER_HASH 56
 #define READ_BYTES 65536
 #define PART_BYTES 16384 /* of a message: so much is lost at most where a connection breaks */
 
@@ -58,14 +57,14 @@ static ssize_t read_at(int fd, void *to, size_t n, uint64_t at)
 
 static int read_header(struct fetch_read *read, int fd)
 {
-	uint8_t header[HEADER_BYTES];
+	uint8_t header[FILE_HEADER_BYTES];
 	struct stat status;
-	uint64_t hash = 0;
+	uint64_t hash;
 
-	if (fstat(fd, &status) != 0 || !S_ISREG(status.st_mode) || read_at(fd, header, sizeof header, 0) != HEADER_BYTES)
+	if (fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)
+	    || read_at(fd, header, sizeof header, 0) != FILE_HEADER_BYTES)
 		return psr_fail(&read->error, PSR_ERR_IO, "the model's file cannot be read");
-	for (int i = 0; i < 8; i++)
-		hash |= (uint64_t)header[HEADER_HASH + i] << 8 * i;
+	hash = file_get(header + HEADER_HASH, 8);
 	if (read->hash != 0 && read->hash != hash)
 		return psr_fail(&read->error, PSR_ERR_NOT_FOUND, "the model's file is another one by now");
 	read->hash = hash;
