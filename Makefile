@@ -9,7 +9,7 @@ VERSION := 0.1.0
 
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev liblzf-dev
-DEPS_TEST  := libcmocka-dev assimp-testmodels python3 xvfb xdotool libx11-dev
+DEPS_TEST  := libcmocka-dev assimp-testmodels python3 xvfb xdotool libx11-dev weston
 DEPS_VIEW  := libsdl2-dev libimgui-dev libchafa-dev
 DEPS_STUDY := gnuplot-nox
 DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev

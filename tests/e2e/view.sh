@@ -2,44 +2,17 @@
 # psr-view on a screen of Xvfb, with a hand of xdotool. At rest the screen has the pixels of `psr shot`, which the command
 # of a screenshot draws.
 . "$(dirname "$0")/lib.sh"
-here=$PWD
+. "$(dirname "$0")/window.sh"
 
-export LSAN_OPTIONS=suppressions=$here/tests/tools/view.supp:print_suppressions=0
-
-for program in psr-view Xvfb xdotool; do
-	if ! type -P $program >/dev/null; then
-		skip "a window is turned, zoomed, resized" "$program is not there"
-		exit
-	fi
-done
+needs "a window is turned, zoomed, resized" psr-view Xvfb xdotool
 refuses "without a display a sentence says what to do" 3 "no display.*psr view --term" \
 	timeout 10 env -u DISPLAY -u WAYLAND_DISPLAY -u SDL_VIDEODRIVER psr view --model teapot
 refuses "two files" 2 "one file at a time" timeout 10 psr view a.ply b.ply
 refuses "a path that is none" 4 "no path that --record wrote" timeout 10 psr view --play "$here/tests/e2e/lib.sh"
 
-mkdir "$work/screen" "$work/shots"
-Xvfb -noreset -displayfd 3 -screen 0 400x320x24 -fbdir "$work/screen" 3>"$work/display" 2>/dev/null &
-xvfb_pid=$!
-view_pid=
-end() {
-	[ -z "$view_pid" ] || kill $view_pid 2>/dev/null
-	[ -z "$xvfb_pid" ] || kill $xvfb_pid
-	finish
-}
-trap 'end; exit $?' EXIT
-within() { # seconds command...: tries it until it succeeds
-	local tries=$(($1 * 20))
-	shift
-	for _ in $(seq $tries); do
-		"$@" >/dev/null 2>&1 && return 0
-		sleep 0.05
-	done
-	return 1
-}
-within 10 test -s "$work/display"
-DISPLAY=:$(cat "$work/display")
+open_screen 400x320
 # Mesa, where it is installed, leaks from a library that it unloads.
-export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software SDL_FRAMEBUFFER_ACCELERATION=0
+export SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software SDL_FRAMEBUFFER_ACCELERATION=0
 
 # --- a hand ---
 view() { # psr-view's options
@@ -55,37 +28,12 @@ drag() { # button dx dy: from the middle, in steps
 	for _ in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative --sync -- $(($2 / 8)) $(($3 / 8)); done
 	xdotool mouseup "$1"
 }
-n_shots=0
-shot() { # takes a screenshot, which waits until the picture is sharp; sets $command
-	n_shots=$((n_shots + 1))
-	xdotool key F2
-	within 20 test -s "$work/shots/psr-view-$n_shots.png"
-	within 1 grep -q "psr-view-$n_shots.png" "$work/view.log"
-	command=$(grep "^psr shot.*psr-view-$n_shots.png" "$work/view.log")
-	xdotool key Shift_L # the note goes
-}
-draws_the_same() { # the screenshot's command draws the screenshot
-	sh -c "${command% -o *} -o '$work/true.png'" 2>/dev/null && cmp "$work/true.png" "$work/shots/psr-view-$n_shots.png"
-}
 read_screen() { # [rows]: the window's pixels, or its upper rows, into $work/screen.ppm, without the mouse
 	xdotool mousemove 0 0
 	eval "$(xdotool getwindowgeometry --shell "$window")"
-	python3 tests/tools/screen.py "$work/screen/Xvfb_screen0" "$X" "$Y" "$WIDTH" "${1:-$HEIGHT}" "$work/screen.ppm"
+	read_pixels "$X" "$Y" "$WIDTH" "${1:-$HEIGHT}"
 }
-screen_is() { read_screen && cmp -s "$work/screen.ppm" "$1"; }
 has_turned() { read_screen 100 && ! cmp -s "$work/screen.ppm" "$1"; } # what is written below is not looked at
-is_true() { # claim: screenshot, its command and the screen agree
-	shot
-	check "$1: psr shot draws the same, bit for bit" draws_the_same
-	sh -c "${command% -o *} -o '$work/true.ppm'" 2>/dev/null
-	check "$1: and the screen has it" within 5 screen_is "$work/true.ppm"
-}
-said() { sed -n "s/.*--$1 \([^ ]*\).*/\1/p" <<<"$command"; } # the value of an option of $command
-differs() { # claim a b
-	if [ "$2" != "$3" ]; then ok "$1"; else not_ok "$1" "'$2' twice"; fi
-}
-length() { awk -v a="$1" -v b="$2" 'BEGIN { split(a, p, ","); split(b, q, ",")
-	print sqrt((p[1] - q[1]) ^ 2 + (p[2] - q[2]) ^ 2 + (p[3] - q[3]) ^ 2) }'; }
 
 start_psrd --models tests/golden --threads 2
 address=$server
