@@ -124,7 +124,7 @@ static void search(struct bars *bars, const struct fitting *f, const struct rect
 		return;
 	if (cell_node_is_leaf(node)) {
 		look_at(bars, f, r, &f->look.surface->cell[f->look.tree->order[node->begin]], node->radius);
-	} else if (!rectangle_covers_node(&f->look, r, node, p)) {
+	} else if (!rectangle_suits_node(&f->look, r, node, p)) {
 		/* The nearer half first: its bars are before most of the other's. */
 		v3f_sub(a, node[i + 1].middle, r->at);
 		v3f_sub(b, node[i + 2].middle, r->at);

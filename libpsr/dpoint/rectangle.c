@@ -6,6 +6,8 @@
 
 /* Of unit vectors so near to each other the angle's tangent is at most 1.2 times their distance. */
 #define MOST_CHORD 0.6f
+/* Of a normal's angle: the derivative of asin is at most 1.6 up to here. */
+#define MOST_SINE 0.78f
 
 void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
                   const struct dpoint_cover_options *options)
@@ -89,15 +91,15 @@ int rectangle_covers(const struct looking *l, const struct rectangle *r, const s
 	return rectangle_suits(l, r, cell, middle);
 }
 
-/* Within the sphere S_p's normal
- * turns by radius |lambda_u| at most, and heights part by the tangent of the normals' difference. */
-int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
-                          const float p[3])
+/* Within the sphere S_p's normal turns by 1.6 radius |lambda_u| at most, as long as the sine of its angle is below
+ * MOST_SINE, and heights part by the tangent of the normals' difference. */
+int rectangle_suits_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
+                         const float p[3])
 {
+	const float away = fmaxf(fabsf(p[0]), fabsf(p[1])) + node->radius;
 	float n[3], normal[3], chord;
 
-	if (!(fabsf(p[0]) + node->radius <= r->extent[0] && fabsf(p[1]) + node->radius <= r->extent[1]) ||
-	    node->spread >= MOST_CHORD || (l->options->is_within_parts && node->part != r->part))
+	if (node->spread >= MOST_CHORD || !(away * fabsf(r->lambda_u) <= MOST_SINE))
 		return 0;
 	dpoint_normal_at(n, r->lambda_u, r->rho, p[0], p[1]);
 	v3f_normalize(n, n);
@@ -108,3 +110,9 @@ int rectangle_covers_node(const struct looking *l, const struct rectangle *r, co
 	                            1.2f * chord * node->radius <= r->height;
 }
 
+int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
+                          const float p[3])
+{
+	return fabsf(p[0]) + node->radius <= r->extent[0] && fabsf(p[1]) + node->radius <= r->extent[1] &&
+	       !(l->options->is_within_parts && node->part != r->part) && rectangle_suits_node(l, r, node, p);
+}

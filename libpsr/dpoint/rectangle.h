@@ -37,8 +37,10 @@ int rectangle_suits(const struct looking *l, const struct rectangle *r, const st
 /* Whether all corners are within the extents, and the cell suits. */
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell);
 
-/* Whether it covers all cells of a node, told by its sphere, at p in the rectangle's frame, and by its normals alone:
- * 0 may be wrong. */
+/* Whether all cells of a node suit, or are covered, told by its sphere, at p in the rectangle's frame, and by its normals
+ * alone: 0 may be wrong. */
+int rectangle_suits_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
+                         const float p[3]);
 int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
                           const float p[3]);
 
