@@ -33,7 +33,11 @@ start_psrd --models tests/golden --threads 2
 (cd "$work/shots" && WAYLAND_DISPLAY=dense SDL_VIDEODRIVER=wayland exec psr view --bare --server "$server" --model teapot \
 	--size 200x160 --no-inertia >"$work/view.log" 2>"$work/view.err") &
 view_pid=$!
-check "a picture comes" within 20 has_drawn
+if ! within 20 has_drawn && grep -q 'no window can be opened' "$work/view.err"; then
+	skip "a window of two pixels a point" "$(cat "$work/view.err")"
+	exit
+fi
+check "a picture comes" has_drawn
 go_out
 is_true "two pixels a point"
 check "of the screen's pixels, not its points" grep -q -- "--size ${width}x$height" <<<"$command"
