@@ -52,11 +52,11 @@ eval "${command% -o *} --depth '$work/depth.pfm' -o '$work/true.png'" 2>/dev/nul
 at_x=280 at_y=300
 depth=$(tail -c $((4 * width * height)) "$work/depth.pfm" | od -An -v -tf4 -w$((4 * width)) |
 	tail -n +$((height - at_y - 1)) | head -n 1 | awk -v x=$at_x '{ print $(x + 2) }') # rows from the bottom
+sleep 0.6 # not a double click with the drag before
 xdotool mousemove $at_x $at_y click 1
 within 5 has_points 1
 check "a click reads the depth of the pixel below the cursor" awk -v true="$depth" \
 	-v is="$(sed -n 's/^point.*depth \([^ ]*\).*/\1/p' "$work/view.log")" 'BEGIN { exit !((is / true - 1) ^ 2 < 1e-12) }'
-sleep 0.6 # single clicks, not a double one
 xdotool click 4
 sleep 0.1
 xdotool click 4
