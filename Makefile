@@ -363,7 +363,16 @@ $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 .PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cancel bench-codec bench-daemon bench-effects bench-model bench-octree bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
-check: test-bin ## check: run the tests of this config without looking for missing packages
+# PSR_TEST names tests as tests/run does; only what they run is built. Scripts run programs of tests/tools and tests/soak.
+ifneq ($(and $(PSR_TEST),$(filter check,$(MAKECMDGOALS))),)
+NAMED := $(shell for t in $(TEST_BIN:$(BUILD)/tests/%=%) $(patsubst tests/%.sh,%,$(wildcard tests/e2e/*.sh)); do \
+	case $$t in ($(PSR_TEST)) echo $$t ;; esac; done)
+CHECK_BIN := $(addprefix $(BUILD)/tests/,$(filter-out e2e/%,$(NAMED)))
+CHECK_BIN += $(if $(filter e2e/%,$(NAMED)),$(filter $(BUILD)/tests/tools/% $(SOAK),$(TEST_BIN)))
+else
+CHECK_BIN := $(TEST_BIN)
+endif
+check: $(CHECK_BIN) $(PROGRAMS) ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
 
 test: ## test: install what is missing, build, run every test; ends in "N passed, N failed, N skipped"
