@@ -7,6 +7,8 @@
 needs "a window of two pixels a point" psr-view Xvfb xdotool weston
 width=640 height=480 # pixels
 export XDG_RUNTIME_DIR=$work/run
+# SDL on Wayland brings libraries that leak and are unloaded, so no suppression can name them: view.sh looks for leaks.
+export ASAN_OPTIONS=${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0
 mkdir -m 700 "$XDG_RUNTIME_DIR"
 read_screen() { read_pixels 0 0 $width $height; }
 has_drawn() { read_screen && [ "$(tail -c +16 "$work/screen.ppm" | od -An -v -tx1 -w3 | sort -u | head -n 20 | wc -l)" -ge 20 ]; }
@@ -69,6 +71,5 @@ within 5 has_points 2
 check "towards what is below the cursor: it stays there" awk \
 	-v d="$(length $(sed -n 's/^point \([^ ]*\).*/\1/p' "$work/view.log"))" 'BEGIN { print d; exit !(d > 0 && d < 0.03) }'
 xdotool key Escape
-check "Escape ends it" wait $view_pid
-view_pid=
+ends "Escape ends it"
 check "psrd stops cleanly" stop_psrd

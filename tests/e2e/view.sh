@@ -118,8 +118,7 @@ if type -P psr-model >/dev/null && [ -x "$BUILD/tests/tools/drop" ]; then
 		grep -q "^psr shot $work/tower.obj --model tower --size" <<<"$command"
 fi
 xdotool key Escape
-check "Escape ends it" wait $view_pid
-view_pid=
+ends "Escape ends it"
 
 # --- lights and models by hand ---
 hold_and_drag() { # key dx dy [modifier]
@@ -164,8 +163,7 @@ hold_and_drag g 0 -40 ctrl
 is_drawn "a model that was made larger"
 check "says so, too" awk -v s="$(models | sed -n 's/.*scale=//p')" 'BEGIN { exit !(s > 1.05 && s < 1.2) }'
 xdotool key Escape
-check "and ends" wait $view_pid
-view_pid=
+ends "and ends"
 
 # --- a way of the camera ---
 view --server "$address" --model wheel --size 320x240 --no-inertia --record "$work/way.json"
@@ -182,8 +180,7 @@ sleep 0.3
 shot
 check "and played to its end" [ "$(said eye)" = "$(command=$last said eye)" ]
 xdotool key Escape
-check "the end is quiet" wait $view_pid
-view_pid=
+ends "the end is quiet"
 check "nothing is said on standard error" test ! -s "$work/view.err"
 
 # --- a display that goes ---

@@ -51,6 +51,13 @@ shot() { # takes a screenshot, which waits until the picture is sharp; sets $com
 draws_the_same() { # the screenshot's command draws the screenshot
 	sh -c "${command% -o *} -o '$work/true.png'" 2>/dev/null && cmp "$work/true.png" "$work/shots/psr-view-$n_shots.png"
 }
+ends() { # claim: the viewer ends with status 0
+	local status
+	wait $view_pid
+	status=$?
+	view_pid=
+	if [ $status -eq 0 ]; then ok "$1"; else not_ok "$1" "exit status $status: $(head -n 40 "$work/view.err")"; fi
+}
 screen_is() { read_screen && cmp -s "$work/screen.ppm" "$1"; }
 is_true() { # claim: screenshot, its command and the screen agree
 	shot
