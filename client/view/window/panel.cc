@@ -212,6 +212,18 @@ static bool place(const struct viewer *viewer, const double point[3], ImVec2 *at
 	return true;
 }
 
+/* Words on a dark plate: the picture behind may have any colour. */
+static void label(const struct viewer *viewer, ImVec2 at, ImU32 color, const char *text)
+{
+	ImDrawList *list = ImGui::GetBackgroundDrawList();
+	const ImVec2 size = ImGui::CalcTextSize(text);
+	const float edge = points(viewer, 3);
+
+	list->AddRectFilled(ImVec2(at.x - edge, at.y - edge), ImVec2(at.x + size.x + edge, at.y + size.y + edge),
+	                    IM_COL32(16, 18, 22, 200), edge);
+	list->AddText(at, color, text);
+}
+
 static void draw_point(const struct viewer *viewer, const struct viewer_point *point)
 {
 	const struct view_probe *probe = &point->probe;
@@ -229,10 +241,9 @@ static void draw_point(const struct viewer *viewer, const struct viewer_point *p
 		         point->normal[2]);
 	list->AddCircle(at, points(viewer, 4), IM_COL32(0, 0, 0, 255), 0, points(viewer, 3));
 	list->AddCircle(at, points(viewer, 4), IM_COL32(255, 210, 60, 255), 0, points(viewer, 1.5));
-	at.x += points(viewer, 9);
-	at.y += points(viewer, 4);
-	list->AddText(ImVec2(at.x + 1, at.y + 1), IM_COL32(0, 0, 0, 255), text);
-	list->AddText(at, IM_COL32(255, 230, 150, 255), text);
+	at.x += points(viewer, 12);
+	at.y += points(viewer, 7);
+	label(viewer, at, IM_COL32(255, 230, 150, 255), text);
 }
 
 /* The box of the instance that was clicked, where there is another one that it could be. */
@@ -267,8 +278,7 @@ static void draw_distance(const struct viewer *viewer)
 	snprintf(text, sizeof text, "%.6g", std::hypot(std::hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]));
 	list->AddLine(from, to, IM_COL32(0, 0, 0, 255), points(viewer, 3));
 	list->AddLine(from, to, IM_COL32(255, 210, 60, 255), points(viewer, 1.5));
-	list->AddText(ImVec2(middle.x + 1, middle.y + 1), IM_COL32(0, 0, 0, 255), text);
-	list->AddText(middle, IM_COL32(255, 255, 255, 255), text);
+	label(viewer, middle, IM_COL32(255, 255, 255, 255), text);
 }
 
 static void draw_marks(const struct viewer *viewer)
@@ -281,11 +291,11 @@ static void draw_marks(const struct viewer *viewer)
 	    && place(viewer, viewer->hand.pivot, &at))
 		ImGui::GetBackgroundDrawList()->AddCircleFilled(at, points(viewer, 3), IM_COL32(120, 200, 255, 200));
 	draw_picked(viewer);
+	if (viewer->point[0].is_set && viewer->point[1].is_set)
+		draw_distance(viewer);
 	for (const auto &point : viewer->point)
 		if (point.is_set)
 			draw_point(viewer, &point);
-	if (viewer->point[0].is_set && viewer->point[1].is_set)
-		draw_distance(viewer);
 }
 
 extern "C" void panel_draw(struct viewer *viewer)
