@@ -1,5 +1,6 @@
 #include "viewer.h"
 #include <math.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -191,6 +192,38 @@ static int has_display(void)
 	       || (strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
 }
 
+static struct viewer *open_viewer;
+static SDL_threadID loop_thread;
+
+/* Where the display goes Xlib calls exit() in each thread that notices, and SDL's wake-ups of other threads have a
+   connection of their own. One thread may end the program, and frees nothing below the others: the loop's. */
+static int lose_display(void *display)
+{
+	(void)display;
+	while (SDL_ThreadID() != loop_thread)
+		pause();
+	if (open_viewer->is_recording)
+		save_toggle_record(open_viewer);
+	fprintf(stderr, VIEWER_NAME ": the display is gone\n");
+	_exit(3);
+}
+
+/* The library stays loaded to the end: it calls back until then. xcb writes to a display that is gone as to a pipe. */
+static void watch_display(struct viewer *viewer)
+{
+	void *library = strcmp(SDL_GetCurrentVideoDriver(), "x11") == 0 ? SDL_LoadObject("libX11.so.6") : NULL;
+	int (*(*set_handler)(int (*)(void *)))(void *);
+
+	if (library == NULL)
+		return;
+	signal(SIGPIPE, SIG_IGN);
+	open_viewer = viewer;
+	loop_thread = SDL_ThreadID();
+	set_handler = (int (*(*)(int (*)(void *)))(void *))SDL_LoadFunction(library, "XSetIOErrorHandler");
+	if (set_handler != NULL)
+		set_handler(lose_display);
+}
+
 static int open_window(struct viewer *viewer, struct psr_error *err)
 {
 	const struct viewer_options *options = &viewer->options;
@@ -201,6 +234,7 @@ static int open_window(struct viewer *viewer, struct psr_error *err)
 	if (SDL_Init(SDL_INIT_VIDEO) != 0 || !has_display())
 		return psr_fail(err, PSR_ERR_IO, "there is no display to open a window on: run it on a desktop or set $DISPLAY, "
 		                "or say `psr view --term`, which draws in a terminal");
+	watch_display(viewer);
 	viewer->window = SDL_CreateWindow(VIEWER_NAME, SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
 	                                  (int)options->size[0], (int)options->size[1],
 	                                  SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
@@ -238,19 +272,6 @@ static int open_all(struct viewer *viewer, struct psr_error *err)
 	return code;
 }
 
-static struct viewer *open_viewer;
-
-/* Xlib calls exit() where its display goes. Other threads still run then: nothing may be freed below them. */
-static void lose_display(void)
-{
-	if (open_viewer == NULL)
-		return;
-	if (open_viewer->is_recording)
-		save_toggle_record(open_viewer);
-	fprintf(stderr, VIEWER_NAME ": the display is gone\n");
-	_exit(3);
-}
-
 static void close_all(struct viewer *viewer)
 {
 	connect_end(viewer);
@@ -264,13 +285,12 @@ static void close_all(struct viewer *viewer)
 	if (viewer->window != NULL)
 		SDL_DestroyWindow(viewer->window);
 	SDL_Quit();
-	open_viewer = NULL;
 }
 
 int viewer_run(const struct viewer_options *options, struct psr_error *err)
 {
 	struct viewer *viewer = calloc(1, sizeof *viewer);
-	int code = PSR_OK;
+	int code;
 
 	if (viewer == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a viewer");
@@ -281,11 +301,7 @@ int viewer_run(const struct viewer_options *options, struct psr_error *err)
 	viewer->has_overlay = !options->is_bare;
 	/* Without a model the panel's list is where to choose one. */
 	viewer->has_panel = !options->is_bare && options->subject.n_instances == 0 && options->file == NULL;
-	open_viewer = viewer;
-	if (atexit(lose_display) != 0)
-		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a viewer");
-	if (code == PSR_OK)
-		code = open_all(viewer, err);
+	code = open_all(viewer, err);
 	if (code == PSR_OK) {
 		if (options->play != NULL)
 			save_toggle_play(viewer);
