@@ -46,7 +46,9 @@ static void layout_open(struct wire *w, void *p)
 {
 	struct psr_msg_open *m = p;
 
-	wire_u32(w, &m->resolution);
+	wire_u16(w, &m->resolution);
+	wire_u8(w, &m->levels);
+	wire_reserved(w, 1);
 	wire_string(w, m->name, sizeof m->name);
 }
 
@@ -54,7 +56,8 @@ static int check_open(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_open *m = p;
 
-	if (check_integer("the side of the pictures", m->resolution, 0, PSR_WIRE_MAX_SIDE, err))
+	if (check_integer("the side of the pictures", m->resolution, 0, PSR_WIRE_MAX_SIDE, err) ||
+	    check_integer("the number of levels", m->levels, 0, PSR_WIRE_MAX_LEVELS, err))
 		return PSR_ERR_ARG;
 	return check_name(m->name, err);
 }
@@ -91,7 +94,9 @@ static void layout_opened(struct wire *w, void *p)
 	struct psr_msg_opened *m = p;
 
 	wire_u32(w, &m->handle);
-	wire_u32(w, &m->representations);
+	wire_u16(w, &m->representations);
+	wire_u8(w, &m->octree_levels);
+	wire_u8(w, &m->of_levels);
 	wire_bytes(w, m->content_id, sizeof m->content_id);
 	wire_f64(w, m->box_min, 3);
 	wire_f64(w, m->box_max, 3);
@@ -121,6 +126,11 @@ static int check_opened(const void *p, struct psr_error *err)
 	    check_integer("a model's number of blocks", m->n_blocks, 0, PSR_WIRE_MAX_INTEGER, err) ||
 	    check_integer("a model's memory", m->bytes, 0, PSR_WIRE_MAX_INTEGER, err))
 		return PSR_ERR_ARG;
+	if (check_integer("the levels of an octree", m->of_levels, 0, PSR_WIRE_MAX_LEVELS, err))
+		return PSR_ERR_ARG;
+	if ((m->octree_levels == 0) != (m->of_levels == 0) || m->octree_levels > m->of_levels)
+		return psr_fail(err, PSR_ERR_ARG, "a model has %u of the %u levels of its octree: a beginning has some of "
+		                "them, and all else says 0 of 0", m->octree_levels, m->of_levels);
 	if (m->representations == 0 || (m->representations & 1u << PSR_WIRE_REP_AUTO))
 		return psr_fail(err, PSR_ERR_ARG, "a model's representations are %#x: one is needed, and bit 0 is none",
 		                m->representations);

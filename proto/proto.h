@@ -141,9 +141,11 @@ struct psr_msg_error { /* server -> client; ends the id; id 0: about the connect
 
 struct psr_msg_list_end { uint32_t n_entries; };
 struct psr_msg_open {
-	uint32_t resolution;               /* the greater side, in pixels, of the pictures that the model is opened for;
+	uint16_t resolution;               /* the greater side, in pixels, of the pictures that the model is opened for;
 	                                    * 0..16384; 0: unknown. Other values only for a server with
 	                                    * PSR_CAP_RESOLUTION */
+	uint8_t levels;                    /* of a packed octree's file its shortest beginning of at least so many levels;
+	                                    * 0..PSR_WIRE_MAX_LEVELS, 0: all. Other values only with PSR_CAP_LEVELS */
 	char name[PSR_WIRE_MAX_NAME + 1];  /* not empty */
 };
 struct psr_msg_close { uint32_t handle; }; /* only a failure is answered, by ERROR; scenes with the model keep it */

@@ -129,6 +129,7 @@ struct psr_client {
 	uint32_t next_id;
 	struct psr_msg_welcome welcome;
 	uint32_t resolution;          /* for OPEN */
+	uint8_t levels;               /* for OPEN */
 	void (*on_progress)(const struct psr_msg_progress *progress, void *userdata);
 	void *userdata;
 	struct client_decoder *decoder;

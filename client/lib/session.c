@@ -121,6 +121,11 @@ void psr_client_set_resolution(struct psr_client *client, uint32_t pixels)
 	client->resolution = pixels < PSR_WIRE_MAX_SIDE ? pixels : PSR_WIRE_MAX_SIDE;
 }
 
+void psr_client_set_levels(struct psr_client *client, uint32_t levels)
+{
+	client->levels = (uint8_t)(levels < PSR_WIRE_MAX_LEVELS ? levels : PSR_WIRE_MAX_LEVELS);
+}
+
 void psr_client_on_progress(struct psr_client *client,
                             void (*fn)(const struct psr_msg_progress *progress, void *userdata), void *userdata)
 {
@@ -131,7 +136,7 @@ void psr_client_on_progress(struct psr_client *client,
 int psr_client_open(struct psr_client *client, const char *name, int timeout_ms, struct psr_msg_opened *opened,
                     struct psr_error *err)
 {
-	struct psr_msg_open msg = { 0, "" };
+	struct psr_msg_open msg = { .resolution = 0 };
 	int code;
 
 	if (name[0] == '\0' || strlen(name) > PSR_WIRE_MAX_NAME)
@@ -141,7 +146,9 @@ int psr_client_open(struct psr_client *client, const char *name, int timeout_ms,
 		return code;
 	strcpy(msg.name, name);
 	if (client->welcome.capabilities & PSR_CAP_RESOLUTION)
-		msg.resolution = client->resolution;
+		msg.resolution = (uint16_t)client->resolution;
+	if (client->welcome.capabilities & PSR_CAP_LEVELS)
+		msg.levels = client->levels;
 	code = psr_msg_open_encode(&client->out, client->control_id, &msg, err);
 	if (code != PSR_OK)
 		return withdraw(client, code);

@@ -27,6 +27,10 @@ static void add_model(cJSON *to, const struct shot_facts *facts)
 	cJSON_AddNumberToObject(model, "blocks", (double)opened->n_blocks);
 	cJSON_AddNumberToObject(model, "levels", opened->n_levels);
 	cJSON_AddNumberToObject(model, "bytes", (double)opened->bytes);
+	if (opened->octree_levels > 0) {
+		cJSON_AddNumberToObject(model, "octree_levels", opened->octree_levels);
+		cJSON_AddNumberToObject(model, "of_levels", opened->of_levels);
+	}
 	json_add_number(model, "spacing", opened->spacing);
 	cJSON_AddNumberToObject(model, "resolution", opened->resolution);
 	json_add_number(model, "scale", opened->scale);

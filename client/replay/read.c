@@ -105,6 +105,19 @@ static const cJSON *request_of(const cJSON *report)
 	return cJSON_GetObjectItemCaseSensitive(report, "request");
 }
 
+/* Returns the member's place among the words, from 1 on. */
+static uint8_t find_kind(struct reader *reader, const cJSON *from, const char *name, const char *const *kinds, int n)
+{
+	const char *kind = get_string(reader, from, name);
+
+	for (int i = 0; i < n; i++)
+		if (strcmp(kind, kinds[i]) == 0)
+			return (uint8_t)(i + 1);
+	if (reader->missing == NULL)
+		reader->missing = name;
+	return 0;
+}
+
 int replay_wish(struct scene_wish *wish, const cJSON *report, struct psr_error *err)
 {
 	struct reader reader = { NULL };
@@ -125,6 +138,10 @@ int replay_wish(struct scene_wish *wish, const cJSON *report, struct psr_error *
 
 		snprintf(to->model, sizeof to->model, "%s", get_string(&reader, model, "name"));
 		to->pixels = (uint32_t)get_number(&reader, model, "resolution", 1, UINT32_MAX);
+		if (cJSON_HasObjectItem(model, "octree_levels"))
+			to->levels = (uint32_t)get_number(&reader, model, "octree_levels", 1, PSR_WIRE_MAX_LEVELS);
+		if (cJSON_HasObjectItem(item, "as"))
+			to->place.representation = find_kind(&reader, item, "as", &instance_representations[1], 3);
 		get_numbers(&reader, to->place.rotation, item, "rotation", 4);
 		get_numbers(&reader, to->place.translation, item, "translation", 3);
 		to->place.scale = get_number(&reader, item, "scale", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);
@@ -132,22 +149,10 @@ int replay_wish(struct scene_wish *wish, const cJSON *report, struct psr_error *
 	return finish(&reader, err);
 }
 
-static uint8_t find_kind(struct reader *reader, const cJSON *from, const char *const *kinds, int n)
-{
-	const char *kind = get_string(reader, from, "kind");
-
-	for (int i = 0; i < n; i++)
-		if (strcmp(kind, kinds[i]) == 0)
-			return (uint8_t)(i + 1);
-	if (reader->missing == NULL)
-		reader->missing = "kind";
-	return 0;
-}
-
 static void read_light(struct reader *reader, struct psr_msg_light *light, const cJSON *from)
 {
 	memset(light, 0, sizeof *light);
-	light->kind = find_kind(reader, from, view_light_kinds, 3);
+	light->kind = find_kind(reader, from, "kind", view_light_kinds, 3);
 	light->flags = get_flag(reader, from, "shadow") ? PSR_WIRE_LIGHT_SHADOW : 0;
 	get_color(reader, light->color, from, "color");
 	light->intensity = get_number(reader, from, "intensity", 0, PSR_WIRE_MAX_INTENSITY);
@@ -243,7 +248,7 @@ int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_er
 		return psr_fail(err, PSR_ERR_FORMAT, "--replay: the report's size is no size of a picture");
 	frame->width = (uint32_t)size[0];
 	frame->height = (uint32_t)size[1];
-	frame->camera.kind = find_kind(&reader, camera, view_camera_kinds, 2) == 2 ? PSR_CAMERA_ORTHOGRAPHIC
+	frame->camera.kind = find_kind(&reader, camera, "kind", view_camera_kinds, 2) == 2 ? PSR_CAMERA_ORTHOGRAPHIC
 	                                                                           : PSR_CAMERA_PERSPECTIVE;
 	get_numbers(&reader, frame->camera.eye, camera, "eye", 3);
 	get_numbers(&reader, frame->camera.target, camera, "target", 3);

@@ -40,6 +40,8 @@ static void add_scene(cJSON *to, const struct scene *scene)
 		cJSON_AddStringToObject(item, "name", scene->model[i].name);
 		cJSON_AddStringToObject(item, "content_id", json_id(id, scene->model[i].opened.content_id));
 		cJSON_AddNumberToObject(item, "resolution", scene->model[i].opened.resolution);
+		if (scene->model[i].opened.octree_levels > 0)
+			cJSON_AddNumberToObject(item, "octree_levels", scene->model[i].opened.octree_levels);
 		cJSON_AddItemToArray(models, item);
 	}
 	for (uint32_t i = 0; i < scene->msg.n_instances; i++) {
@@ -47,6 +49,8 @@ static void add_scene(cJSON *to, const struct scene *scene)
 
 		item = cJSON_CreateObject();
 		cJSON_AddNumberToObject(item, "model", scene->model_of[i]);
+		if (place->representation != PSR_WIRE_REP_AUTO)
+			cJSON_AddStringToObject(item, "as", instance_representations[place->representation]);
 		json_add_numbers(item, "rotation", place->rotation, 4);
 		json_add_numbers(item, "translation", place->translation, 3);
 		json_add_number(item, "scale", place->scale);

@@ -44,21 +44,22 @@ static int parse_rotation(struct psr_msg_instance *place, const char *text, cons
 	return PSR_OK;
 }
 
+const char *const instance_representations[4] = { "", "blocks", "octree", "dpoints" };
+
 static int parse_representation(struct psr_msg_instance *place, const char *text, const char **end,
                                 struct psr_error *err)
 {
 	const size_t n = strcspn(text, ",");
 
 	*end = text + n;
-	if (n == 6 && memcmp(text, "blocks", 6) == 0)
-		place->representation = PSR_WIRE_REP_BLOCKS;
-	else if (n == 6 && memcmp(text, "octree", 6) == 0)
-		place->representation = PSR_WIRE_REP_OCTREE;
-	else if (n == 7 && memcmp(text, "dpoints", 7) == 0)
-		place->representation = PSR_WIRE_REP_DPOINT;
-	else
-		return psr_fail(err, PSR_ERR_ARG, "as is blocks, octree or dpoints, not '%.40s'; without it the server chooses", text);
-	return PSR_OK;
+	for (uint8_t r = PSR_WIRE_REP_BLOCKS; r <= PSR_WIRE_REP_DPOINT; r++) {
+		if (strlen(instance_representations[r]) != n || memcmp(text, instance_representations[r], n) != 0)
+			continue;
+		place->representation = r;
+		return PSR_OK;
+	}
+	return psr_fail(err, PSR_ERR_ARG, "as is blocks, octree or dpoints, not '%.40s'; without it the server chooses",
+	                text);
 }
 
 static int parse_part(struct psr_msg_instance *place, const char *text, const char **end, struct psr_error *err)

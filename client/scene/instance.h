@@ -8,8 +8,10 @@ struct instance_wish {
 	char model[PSR_WIRE_MAX_NAME + 1];
 	struct psr_msg_instance place; /* without a handle */
 	const char *text; /* as the user wrote it: NAME,at=...; NULL if not in one text */
-	uint32_t pixels; /* for psr_client_set_resolution(); 0: as the scene */
+	uint32_t pixels, levels; /* for psr_client_set_resolution() and _levels(); 0: as the scene */
 };
+
+extern const char *const instance_representations[4]; /* "blocks" and so on, by enum psr_wire_rep; "" for AUTO */
 
 /* Reads NAME[,at=X,Y,Z][,scale=S][,as=blocks|octree|dpoints][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z. Rotations apply
  * in their order, about the model's own 0,0,0, which `at` then places. ARG. */

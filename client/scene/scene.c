@@ -32,8 +32,11 @@ static int open_model(struct scene_model *model, struct psr_client *client, int 
 
 static int open_models(struct scene *scene, const struct scene_wish *wish, int timeout_ms, struct psr_error *err)
 {
+	if (wish->levels > 0 && !(psr_client_welcome(scene->client)->capabilities & PSR_CAP_LEVELS))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server opens whole files alone (capability bit 25): leave "
+		                "--level out");
 	for (uint32_t i = 0; i < wish->n_instances; i++) {
-		uint32_t k = 0, pixels = wish->instance[i].pixels;
+		uint32_t k = 0, pixels = wish->instance[i].pixels, levels = wish->instance[i].levels;
 		int code;
 
 		while (k < scene->n_models && strcmp(scene->model[k].name, wish->instance[i].model) != 0)
@@ -43,6 +46,7 @@ static int open_models(struct scene *scene, const struct scene_wish *wish, int t
 			continue;
 		strcpy(scene->model[k].name, wish->instance[i].model);
 		psr_client_set_resolution(scene->client, pixels != 0 ? pixels : wish->pixels);
+		psr_client_set_levels(scene->client, levels != 0 ? levels : (uint32_t)wish->levels);
 		code = open_model(&scene->model[k], scene->client, wish->is_quiet, timeout_ms, err);
 		if (code != PSR_OK)
 			return code;

@@ -23,6 +23,7 @@ struct scene_wish {
 	char *file_text; /* holds the strings above */
 	int n_said;   /* how many of these options were given */
 	uint32_t pixels; /* the greater side of the pictures */
+	int64_t levels; /* for psr_client_set_levels() */
 	int is_quiet; /* shows no progress on the terminal */
 };
 

@@ -109,6 +109,9 @@ void scene_add_model_options(struct optlist *list, struct scene_wish *wish)
 		{ .name = "scene", .type = PSR_OPT_STRING, .value = &wish->file, .arg = "FILE", .seen = &wish->n_said,
 		  .help = "Models and lights from a text file of words such as instance=teapot,at=1,0,0 light=dir:-1,-2,-1 "
 		          "shadows: the options of this command without dashes. # begins a comment." },
+		{ .name = "level", .type = PSR_OPT_INT, .value = &wish->levels, .arg = "K", .max = PSR_WIRE_MAX_LEVELS,
+		  .help = "Of packed octrees the first levels alone, at least K where the file can be cut there: a coarser "
+		          "model, in no time. 0: all." },
 	};
 
 	add_instances(list, wish);

@@ -22,7 +22,8 @@ struct link_wish {
 	uint32_t n_instances;        /* 0..PSR_WIRE_MAX_INSTANCES: 0 */
 	uint32_t pixels;             /* greater side of the pictures that models are built for: 0, the server decides */
 	uint32_t coarse_pixels;      /* models are opened for pictures of this size first, and for `pixels` once a picture
-	                              * has come, which replaces them: 0, not so */
+	                              * has come, which replaces them: 0, not so. Packed octrees come coarse first in any
+	                              * case, a step after the other */
 
 	struct psr_camera camera;
 	uint32_t width, height;      /* pixels of the picture; 0 x 0: models are opened, and nothing is drawn. At most

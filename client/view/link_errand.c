@@ -61,6 +61,7 @@ static int open_all(struct link_errand *errand, struct psr_client *client, struc
 		memset(&errand->progress, 0, sizeof errand->progress);
 		pthread_mutex_unlock(&errand->lock);
 		psr_client_set_resolution(client, errand->model[i].pixels);
+		psr_client_set_levels(client, errand->model[i].levels);
 		code = psr_client_open(client, errand->model[i].name, TIMEOUT_MS, &opened, err);
 	}
 	return code;

@@ -118,7 +118,7 @@ void link_scene_message(struct psr_msg_scene *scene, const struct link_wish *wis
 
 struct link_errand_model {
 	char name[PSR_WIRE_MAX_NAME + 1];
-	uint32_t pixels;
+	uint32_t pixels, levels; /* for psr_client_set_resolution(), psr_client_set_levels() */
 };
 struct link_errand;
 /* Opens the models, so that the server has them; or, without any, gets the list. wake_fd is written to at progress and
@@ -149,11 +149,12 @@ struct link_models {
 };
 void link_models_fini(struct link_models *models);
 struct link_open_model *link_models_find(const struct link_models *models, const char *name); /* open, or NULL */
-/* Models of the wish that are to be opened, without duplicates: all that are not open, or, with is_fine, those that
- * were opened for other sizes than wish->pixels. The list is the caller's; *n 0: none, and NULL. MEMORY. */
+/* Models of the wish that are to be opened, without duplicates: all that are not open, coarse; or, with is_fine, those
+ * that were opened for other sizes than wish->pixels, or are the beginning of an octree: each time a step more of it.
+ * The list is the caller's; *n 0: none, and NULL. MEMORY. */
 int link_models_lack(struct link_errand_model **out, uint32_t *n, const struct link_models *models,
                      const struct link_wish *wish, int is_fine);
-/* Returns whether each model of the wish is open for pictures of its size. */
+/* Returns whether each model of the wish is open for pictures of its size, and whole. */
 int link_models_are_fine(const struct link_models *models, const struct link_wish *wish);
 /* Opens it on the connection, in the place of an open one of its name. */
 int link_models_open(struct link_models *models, const struct link_errand_model *wanted, struct psr_error *err);

@@ -5,6 +5,7 @@
 #include "link_inside.h"
 
 #define TIMEOUT_MS 10000
+#define FIRST_LEVELS 7 /* of an octree: 128 leaves along the cube, and some ten thousand in all */
 
 void link_models_fini(struct link_models *models)
 {
@@ -30,6 +31,11 @@ struct link_open_model *link_models_find(const struct link_models *models, const
 	return model != NULL && model->opened.handle != 0 ? model : NULL;
 }
 
+static int is_fine_model(const struct link_open_model *model, const struct link_wish *wish)
+{
+	return model->pixels == wish->pixels && model->opened.octree_levels == 0;
+}
+
 static int is_listed(const struct link_errand_model *list, uint32_t n, const char *name)
 {
 	for (uint32_t i = 0; i < n; i++)
@@ -48,7 +54,7 @@ int link_models_lack(struct link_errand_model **out, uint32_t *n, const struct l
 	for (uint32_t i = 0; i < wish->n_instances; i++) {
 		const char *name = wish->instance[i].model;
 		const struct link_open_model *model = link_models_find(models, name);
-		const int is_lacking = is_fine ? model != NULL && model->pixels != wish->pixels : model == NULL;
+		const int is_lacking = is_fine ? model != NULL && !is_fine_model(model, wish) : model == NULL;
 
 		if (!is_lacking || is_listed(list, *n, name))
 			continue;
@@ -58,7 +64,12 @@ int link_models_lack(struct link_errand_model **out, uint32_t *n, const struct l
 				return PSR_ERR_MEMORY;
 		}
 		strcpy(list[*n].name, name);
-		list[(*n)++].pixels = !is_fine && wish->coarse_pixels != 0 ? wish->coarse_pixels : wish->pixels;
+		list[*n].pixels = !is_fine && wish->coarse_pixels != 0 ? wish->coarse_pixels : wish->pixels;
+		if (!is_fine)
+			list[*n].levels = FIRST_LEVELS;
+		else if (model->opened.octree_levels > 0)
+			list[*n].levels = model->opened.octree_levels + 1;
+		(*n)++;
 	}
 	*out = list;
 	return PSR_OK;
@@ -69,7 +80,7 @@ int link_models_are_fine(const struct link_models *models, const struct link_wis
 	for (uint32_t i = 0; i < wish->n_instances; i++) {
 		const struct link_open_model *model = link_models_find(models, wish->instance[i].model);
 
-		if (model == NULL || model->pixels != wish->pixels)
+		if (model == NULL || !is_fine_model(model, wish))
 			return 0;
 	}
 	return 1;
@@ -122,6 +133,7 @@ int link_models_open(struct link_models *models, const struct link_errand_model 
 	if (model == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model");
 	psr_client_set_resolution(client, wanted->pixels);
+	psr_client_set_levels(client, wanted->levels);
 	psr_client_on_progress(client, on_progress, &opening);
 	code = psr_client_open(client, wanted->name, TIMEOUT_MS, &opened, err);
 	psr_client_on_progress(client, NULL, NULL);

@@ -1,19 +1,12 @@
 #include <assert.h>
-#include <errno.h>
-#include <fcntl.h>
-#include <inttypes.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "base/mem.h"
 #include "cubes.h"
 #include "file.h"
 #include "pack.h"
-
-#define MAX_NAME 200 /* of a path in an error text, to leave room for the sentence */
 
 #define LEAST_SHARED ((size_t)8 << 20) /* bytes of an image whose checks threads share */
 
@@ -75,210 +68,17 @@ int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, in
 	return PSR_OK;
 }
 
-static const char *short_name(const char *path)
+void model_set_source(struct psr_model *model, uint64_t file_bytes, const struct pack_facts *facts)
 {
-	size_t length = strlen(path);
-
-	return length > MAX_NAME ? path + length - MAX_NAME : path;
+	model->file_bytes = file_bytes;
+	model->is_packed = facts != NULL;
+	if (facts != NULL)
+		model->facts = *facts;
 }
 
-/* Facts about a file before reading. */
-struct found {
-	int fd, is_packed;
-	size_t n_bytes;   /* of the file */
-	uint64_t n_image; /* its unpacked size by the header, if packed */
-	uint64_t n_whole; /* its own size by the header, if packed */
-};
-
-static int adopt_packed(struct psr_model **out, const struct pack_source *source, struct psr_error *err)
+size_t model_own_bytes(void)
 {
-	uint8_t *image = NULL;
-	struct pack_facts facts;
-	size_t n_image = 0;
-	int code = pack_open(&image, &n_image, &facts, source, err);
-
-	if (code == PSR_OK)
-		code = model_adopt(out, image, n_image, 0, source->name, err);
-	if (code == PSR_OK) {
-		(*out)->is_packed = 1;
-		(*out)->facts = facts;
-		(*out)->file_bytes = source->n_bytes;
-	}
-	return code;
-}
-
-/* Opens a regular file with the beginning of a .psr file. */
-static int open_file(struct found *found, const char *path, const char *name, struct psr_error *err)
-{
-	uint8_t header[FILE_HEADER_BYTES] = { 0 };
-	struct stat st;
-	ssize_t got;
-	int code, *fd = &found->fd;
-
-	/* O_NONBLOCK: opening a pipe without a writer would wait for one. */
-	*fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-	if (*fd < 0)
-		return psr_fail(err, errno == ENOENT || errno == ENOTDIR ? PSR_ERR_NOT_FOUND : PSR_ERR_IO,
-		                "%s: cannot open the model: %m", name);
-	if (fstat(*fd, &st) != 0)
-		code = psr_fail(err, PSR_ERR_IO, "%s: cannot look at the file: %m", name);
-	else if (!S_ISREG(st.st_mode))
-		code = psr_fail(err, PSR_ERR_IO, "%s: not a regular file", name);
-	else if ((got = pread(*fd, header, sizeof header, 0)) < 0)
-		code = psr_fail(err, PSR_ERR_IO, "%s: cannot read the file: %m", name);
-	else if (got < FILE_HEADER_BYTES)
-		code = psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zd, within its header (bytes 0 to %d); it is "
-		                "not a .psr file or was cut short", name, got, FILE_HEADER_BYTES);
-	else
-		code = file_check_header(header, name, err);
-	if (code != PSR_OK) {
-		close(*fd);
-		return code;
-	}
-	found->n_bytes = (size_t)st.st_size;
-	found->is_packed = pack_is_packed(header);
-	found->n_image = file_get(header + HEADER_FILE_SIZE, 8);
-	found->n_whole = file_get(header + HEADER_PACKED_SIZE, 8);
-	return PSR_OK;
-}
-
-static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, struct psr_error *err)
-{
-	size_t at = 0;
-
-	while (at < n_bytes) {
-		ssize_t got = read(fd, bytes + at, n_bytes - at);
-
-		if (got < 0 && errno == EINTR)
-			continue;
-		if (got < 0)
-			return psr_fail(err, PSR_ERR_IO, "%s: cannot read the file from byte %zu on: %m", name, at);
-		if (got == 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: the file shrank to %zu bytes while it was read", name, at);
-		at += (size_t)got;
-	}
-	return PSR_OK;
-}
-
-static int map_image(const uint8_t **out, int fd, size_t n_bytes, const char *name, struct psr_error *err)
-{
-	void *bytes = mmap(NULL, n_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
-
-	if (bytes == MAP_FAILED)
-		return psr_fail(err, errno == ENOMEM ? PSR_ERR_MEMORY : PSR_ERR_IO, "%s: cannot map the file: %m", name);
-	*out = bytes;
-	return PSR_OK;
-}
-
-static int read_image(const uint8_t **out, int fd, size_t n_bytes, const char *name, struct psr_error *err)
-{
-	uint8_t *bytes = psr_alloc_huge(n_bytes);
-	int code;
-
-	if (bytes == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a model of %zu bytes", name, n_bytes);
-	code = read_all(fd, bytes, n_bytes, name, err);
-	if (code != PSR_OK) {
-		psr_free_huge(bytes, n_bytes);
-		return code;
-	}
-	*out = bytes;
-	return PSR_OK;
-}
-
-/* pixels: of a first picture; 0: reads all. */
-static int open_model(struct psr_model **out, const char *path, int mapped, uint32_t pixels, struct psr_error *err)
-{
-	const char *name = short_name(path);
-	const uint8_t *bytes = NULL;
-	struct found f;
-	int code = open_file(&f, path, name, err);
-
-	if (code != PSR_OK)
-		return code;
-	if (f.is_packed) {
-		struct pack_source source = { .fd = f.fd, .n_bytes = f.n_bytes, .name = name };
-
-		if (pixels > 0)
-			source.n_bytes = pack_coarse_end(&source, pixels);
-		code = adopt_packed(out, &source, err);
-	} else {
-		code = mapped ? map_image(&bytes, f.fd, f.n_bytes, name, err) : read_image(&bytes, f.fd, f.n_bytes, name, err);
-	}
-	close(f.fd);
-	if (f.is_packed || code != PSR_OK)
-		return code;
-	code = model_adopt(out, bytes, f.n_bytes, mapped, name, err);
-	if (code == PSR_OK)
-		(*out)->file_bytes = f.n_bytes;
-	return code;
-}
-
-int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
-{
-	const char *name = short_name(path);
-	struct found f;
-	uint64_t cubes;
-	int code = open_file(&f, path, name, err);
-
-	if (code != PSR_OK)
-		return code;
-	if (f.is_packed && f.n_whole > f.n_bytes && f.n_image > pack_max_image(f.n_bytes))
-		f.n_image = pack_max_image(f.n_bytes); /* a beginning of the file becomes no more */
-	if (f.is_packed && f.n_image > pack_max_image(f.n_bytes)) {
-		close(f.fd);
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; the limit is "
-		                "%d to 1", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
-	}
-	cubes = model_cubes_need(&(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = name }, f.is_packed);
-	close(f.fd);
-	if (f.is_packed && f.n_whole > f.n_bytes && cubes > 2 * f.n_image)
-		cubes = 2 * f.n_image; /* OCTR counts the whole tree */
-	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model) + cubes;
-	return PSR_OK;
-}
-
-int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err)
-{
-	return open_model(out, path, 1, 0, err);
-}
-
-int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err)
-{
-	return open_model(out, path, 0, 0, err);
-}
-
-int psr_model_read_coarse(struct psr_model **out, const char *path, uint32_t pixels, struct psr_error *err)
-{
-	return open_model(out, path, 0, pixels, err);
-}
-
-int psr_model_has_coarse(const char *path, uint32_t pixels)
-{
-	struct found f;
-	uint64_t end;
-
-	if (open_file(&f, path, path, NULL) != PSR_OK)
-		return 0;
-	end = pack_coarse_end(&(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = path }, pixels);
-	close(f.fd);
-	return end < f.n_bytes;
-}
-
-int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err)
-{
-	uint8_t *copy;
-
-	if (n_bytes == 0)
-		return psr_fail(err, PSR_ERR_FORMAT, "the model has no bytes");
-	if (n_bytes >= FILE_HEADER_BYTES && file_check_header(bytes, "the model", NULL) == PSR_OK && pack_is_packed(bytes))
-		return adopt_packed(out, &(struct pack_source){ .fd = -1, .bytes = bytes, .n_bytes = n_bytes,
-		                                                .name = "the model" }, err);
-	copy = psr_alloc_huge(n_bytes);
-	if (copy == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %zu bytes", n_bytes);
-	memcpy(copy, bytes, n_bytes);
-	return model_adopt(out, copy, n_bytes, 0, "the model", err);
+	return sizeof(struct psr_model);
 }
 
 struct psr_model *psr_model_ref(struct psr_model *model)

@@ -66,6 +66,7 @@ struct pack_source {
 	const uint8_t *bytes;
 	uint64_t n_bytes;
 	const char *name;
+	const struct psr_cancel *cancel; /* who may stop the unpacking of its octree; NULL: nobody */
 };
 
 int pack_is_packed(const uint8_t *header); /* FILE_HEADER_BYTES of them */
@@ -77,13 +78,25 @@ struct pack_facts {
 };
 
 /* Unpacks to the plain image, in memory of psr_alloc_huge(), unchecked by file_parse(). A file of an octree that ends
- * early becomes the image of the model of its last whole step. FORMAT, VERSION, IO, MEMORY. */
+ * early becomes the image of the model of its last whole step. FORMAT, VERSION, IO, MEMORY,
+ * CANCELLED. */
 int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const struct pack_source *source,
               struct psr_error *err);
 
-/* Finds where the first step ends whose leaves are at most 1 / (2 * pixels) of the cube: so much of the file is enough
- * for a picture of so many pixels. The file's own size if that is no whole packed octree, or is damaged before. */
-uint64_t pack_coarse_end(const struct pack_source *source, uint32_t pixels);
+/* The beginnings of a packed octree's file that are models, coarse first: its steps but for the last. */
+struct pack_beginning {
+	uint32_t levels;
+	uint64_t end;  /* of the file: so many bytes are there */
+	double part;   /* of the whole octree's leaves */
+	uint64_t n_rest; /* of the image: bytes of all but the octree's arrays, the same in each beginning */
+};
+/* Finds them; *beginning has OCTREE_MOST_STEPS. Returns their number: 0 of a file that is no whole packed octree, or is
+ * damaged before them. */
+int pack_beginnings(struct pack_beginning *beginning, const struct pack_source *source);
+
+/* For a new model, which nobody else knows: the size of the file that it came from; facts NULL: a plain one. */
+void model_set_source(struct psr_model *model, uint64_t file_bytes, const struct pack_facts *facts);
+size_t model_own_bytes(void); /* that a model takes beside its image, cubes and points */
 
 /* Reads OCTR of a packed file. Returns 0 if there is none, or anything is wrong with the file. */
 int pack_read_octree(uint8_t octree[OCTREE_BYTES], const struct pack_source *source);

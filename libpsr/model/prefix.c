@@ -90,7 +90,8 @@ static int unpack_part(const struct unpacker *u, struct part *part)
 	if (step->n_leaves > OCTREE_CHUNK)
 		code = psr_pool_create(&pool, psr_pool_all_cores(), u->err);
 	if (code == PSR_OK) {
-		code = octree_unpack(&part->tree, part->bytes, step->end, step->n_leaves, pool, &what);
+		code = octree_unpack(&part->tree, part->bytes, step->end, step->n_leaves,
+		                     &(struct octree_crew){ pool, u->source->cancel }, &what);
 		if (code != PSR_OK)
 			psr_fail(u->err, code, "%s: %s", u->source->name, what.text);
 	}
@@ -204,13 +205,14 @@ static int make_image(struct unpacker *u, uint8_t **out, const struct part *part
 	return PSR_OK;
 }
 
-uint64_t pack_coarse_end(const struct pack_source *source, uint32_t pixels)
+int pack_beginnings(struct pack_beginning *beginning, const struct pack_source *source)
 {
 	struct psr_error ignored;
 	struct unpacker u = { .source = source, .err = &ignored };
 	struct pack_source start = *source;
 	struct part part = { .bytes = NULL };
-	uint64_t end = source->n_bytes;
+	uint64_t n_rest;
+	int n = 0;
 
 	if (unpack_fetch(&u, u.header, 0, FILE_HEADER_BYTES) == PSR_OK
 	    && file_get(u.header + HEADER_PACKING, 4) == PACKING_OCTREE && unpack_read_head(&u) == PSR_OK
@@ -220,16 +222,22 @@ uint64_t pack_coarse_end(const struct pack_source *source, uint32_t pixels)
 		start.n_bytes = begin + PACK_PIECE_BYTES;
 		u.source = &start;
 		read_part(&u, &part); /* fails where the first step takes more than a piece, and has read the steps */
-		for (int s = part.n_steps - 2; s >= 0; s--) {
-			const uint64_t pieces = pack_pieces(part.step[s].end) * PACK_PIECE_BYTES;
+		n_rest = u.n_image;
+		for (uint32_t i = 0; i < u.n_sections; i++)
+			if (pack_is_of_octree(u.packing, unpack_entry(&u, i)))
+				n_rest -= file_get(unpack_entry(&u, i) + ENTRY_LENGTH, 8);
+		for (int s = 0; s < part.n_steps - 1; s++) {
+			const struct octree_step *step = &part.step[s], *last = &part.step[part.n_steps - 1];
+			const uint64_t pieces = pack_pieces(step->end) * PACK_PIECE_BYTES;
 
-			if ((uint64_t)1 << part.step[s].depth >= 2 * (uint64_t)pixels && pieces < u.n_octree)
-				end = begin + pieces;
+			if (pieces < u.n_octree)
+				beginning[n++] = (struct pack_beginning){ (uint32_t)step->depth, begin + pieces,
+				                                          (double)step->n_leaves / (double)last->n_leaves, n_rest };
 		}
 	}
 	part_fini(&part);
 	psr_free(u.head);
-	return end;
+	return n;
 }
 
 int unpack_prefix(struct unpacker *u, uint8_t **image, struct pack_facts *facts)

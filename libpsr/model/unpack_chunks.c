@@ -164,7 +164,7 @@ static int unpack_octree(struct unpacker *u, uint8_t *image, struct octree_share
 	if (code == PSR_OK && tree.n_leaves > OCTREE_CHUNK)
 		code = psr_pool_create(&pool, psr_pool_all_cores(), u->err);
 	if (code == PSR_OK) {
-		code = octree_unpack_into(&tree, bytes, u->n_octree, pool, &what);
+		code = octree_unpack_into(&tree, bytes, u->n_octree, &(struct octree_crew){ pool, u->source->cancel }, &what);
 		if (code != PSR_OK)
 			psr_fail(u->err, code, "%s: %s", u->source->name, what.text);
 		octree_packed_shares(shares, bytes, u->n_octree);

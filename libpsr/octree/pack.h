@@ -49,15 +49,22 @@ int octree_packed_steps(struct octree_step *step, const uint8_t *bytes, size_t n
 int octree_pack(uint8_t **bytes, size_t *n_bytes, const struct octree *tree, enum octree_packing packing,
                 struct psr_pool *pool, struct psr_error *err);
 
+/* Who unpacks: threads (NULL: the caller's alone), and who may stop them (NULL: nobody). They ask before each chunk,
+ * and after each step and stream of one: some tenths of a second apart for chunks of a million leaves. */
+struct octree_crew {
+	struct psr_pool *pool;
+	const struct psr_cancel *cancel;
+};
+
 /* Unpacks a tree of the cube from 0 to 1. Bytes that end with a step are a coarser tree. FORMAT for what octree_pack()
- * does not write; LIMIT: it promises more than max_leaves; MEMORY. Takes memory for what the bytes hold, some 10 KB a
- * byte at worst, and never for what they promise. */
+ * does not write; LIMIT: it promises more than max_leaves; MEMORY; CANCELLED. Takes memory for what the bytes hold,
+ * some 10 KB a byte at worst, and never for what they promise. crew NULL: the caller alone, and nobody stops it. */
 int octree_unpack(struct octree **out, const uint8_t *bytes, size_t n_bytes, uint64_t max_leaves,
-                  struct psr_pool *pool, struct psr_error *err);
+                  const struct octree_crew *crew, struct psr_error *err);
 
 /* The same into the arrays of a tree, which have room for just its counts. FORMAT, too, if the bytes are of other
  * levels or counts, or of attributes other than those whose arrays there are; the arrays may then have any content. */
-int octree_unpack_into(struct octree *tree, const uint8_t *bytes, size_t n_bytes, struct psr_pool *pool,
+int octree_unpack_into(struct octree *tree, const uint8_t *bytes, size_t n_bytes, const struct octree_crew *crew,
                        struct psr_error *err);
 
 /* How many of the packed bytes are codes (with all that is no stream), of each stream of the leaves, and of streams of

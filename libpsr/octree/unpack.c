@@ -25,8 +25,11 @@ static void unpack_chunk(int i, void *userdata)
 	struct codes_job job;
 
 	chunk->rc = octree_codes_begin(&job, &chunk->levels, u->packing);
-	for (int s = 0; s < u->n_steps && chunk->rc == PSR_OK; s++)
+	for (int s = 0; s < u->n_steps && chunk->rc == PSR_OK; s++) {
 		chunk->rc = unpack_step(chunk, &job, &chunk->step[s], u->step[s].depth - u->cut);
+		if (psr_is_cancelled(u->crew.cancel))
+			chunk->rc = PSR_ERR_CANCELLED;
+	}
 	octree_codes_end(&job);
 }
 
@@ -45,6 +48,8 @@ static void unpack_leaves(int i, void *userdata)
 		chunk->rc = octree_attributes_unpack(&leaf, &step->attribute[s], &levels, s);
 		if (chunk->rc == PSR_OK && !coder_is_at_end(&step->attribute[s]))
 			chunk->rc = PSR_ERR_FORMAT;
+		if (psr_is_cancelled(u->crew.cancel))
+			chunk->rc = PSR_ERR_CANCELLED;
 	}
 }
 
@@ -124,11 +129,16 @@ static int alloc_tree(struct unpacking *u)
 	return tree->code != NULL && tree->skip != NULL && chunk_streams(tree) == u->streams ? PSR_OK : PSR_ERR_MEMORY;
 }
 
-/* Returns what the chunks came to. */
-static int first_failure(const struct unpacking *u, struct psr_error *err)
+/* Has the crew do something with each chunk. Returns what the chunks came to. */
+static int do_chunks(struct unpacking *u, void (*fn)(int i, void *userdata), struct psr_error *err)
 {
-	int rc = PSR_OK;
+	int rc = psr_pool_for_until(u->crew.pool, u->crew.cancel, (int)u->n_chunks, fn, u);
 
+	for (uint32_t i = 0; i < u->n_chunks && rc == PSR_OK; i++)
+		if (u->chunk[i].rc == PSR_ERR_CANCELLED)
+			rc = PSR_ERR_CANCELLED;
+	if (rc == PSR_ERR_CANCELLED)
+		return psr_fail(err, rc, "the unpacking of an octree was stopped");
 	for (uint32_t i = 0; i < u->n_chunks; i++)
 		if (u->chunk[i].rc == PSR_ERR_FORMAT)
 			return psr_fail(err, PSR_ERR_FORMAT, "chunk %u of a packed octree is corrupt", i);
@@ -137,7 +147,7 @@ static int first_failure(const struct unpacking *u, struct psr_error *err)
 	return rc == PSR_OK ? rc : psr_fail(err, rc, "no memory to unpack an octree");
 }
 
-static int unpack_all(struct unpacking *u, struct psr_pool *pool, struct psr_error *err)
+static int unpack_all(struct unpacking *u, struct psr_error *err)
 {
 	const uint64_t n_roots = u->n_roots;
 	int rc;
@@ -151,8 +161,7 @@ static int unpack_all(struct unpacking *u, struct psr_pool *pool, struct psr_err
 		return rc;
 	u->n_roots = 0;
 	find_paths(u, 0, 0);
-	psr_pool_for(pool, (int)u->n_chunks, unpack_chunk, u);
-	rc = first_failure(u, err);
+	rc = do_chunks(u, unpack_chunk, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (u->tree != NULL && u->tree->n_skips != count_skips(u))
@@ -163,28 +172,29 @@ static int unpack_all(struct unpacking *u, struct psr_pool *pool, struct psr_err
 	u->tree->n_codes = u->tree->n_leaves = u->tree->n_skips = 0;
 	memset(u->next_top, 0, sizeof u->next_top);
 	place_codes(u, 0, 0);
-	psr_pool_for(pool, (int)u->n_chunks, unpack_leaves, u);
-	return first_failure(u, err);
+	return do_chunks(u, unpack_leaves, err);
 }
 
-static int unpack(struct unpacking *u, uint64_t max_leaves, struct psr_pool *pool, struct psr_error *err)
+static int unpack(struct unpacking *u, uint64_t max_leaves, const struct octree_crew *crew, struct psr_error *err)
 {
 	int rc = unpacking_read_header(u, max_leaves, err);
 
+	if (crew != NULL)
+		u->crew = *crew;
 	if (rc == PSR_OK)
 		rc = unpacking_read_top(u, err);
 	if (rc == PSR_OK)
-		rc = unpack_all(u, pool, err);
+		rc = unpack_all(u, err);
 	chunks_destroy(u->chunk, u->n_chunks);
 	free(u->path);
 	return rc;
 }
 
 int octree_unpack(struct octree **out, const uint8_t *bytes, size_t n_bytes, uint64_t max_leaves,
-                  struct psr_pool *pool, struct psr_error *err)
+                  const struct octree_crew *crew, struct psr_error *err)
 {
 	struct unpacking u = { .at = bytes, .end = bytes + n_bytes };
-	const int rc = unpack(&u, max_leaves, pool, err);
+	const int rc = unpack(&u, max_leaves, crew, err);
 
 	if (rc == PSR_OK)
 		*out = u.tree;
@@ -193,10 +203,10 @@ int octree_unpack(struct octree **out, const uint8_t *bytes, size_t n_bytes, uin
 	return rc;
 }
 
-int octree_unpack_into(struct octree *tree, const uint8_t *bytes, size_t n_bytes, struct psr_pool *pool,
+int octree_unpack_into(struct octree *tree, const uint8_t *bytes, size_t n_bytes, const struct octree_crew *crew,
                        struct psr_error *err)
 {
 	struct unpacking u = { .at = bytes, .end = bytes + n_bytes, .tree = tree };
 
-	return unpack(&u, UINT64_MAX, pool, err); /* all counts have to be the same */
+	return unpack(&u, UINT64_MAX, crew, err); /* all counts have to be the same */
 }

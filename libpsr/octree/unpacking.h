@@ -18,6 +18,7 @@ struct unpacking {
 	uint64_t first[OCTREE_MOST_LEVELS + 1]; /* of each depth up to the cut: its first code among these */
 	uint64_t *path;              /* of the roots */
 	struct chunk *chunk;
+	struct octree_crew crew;
 	struct octree *tree;         /* of the caller, or made once its codes are there */
 	/* While codes are put into their places: the next node of each depth above the cut, chunk, root of it, and code of
 	 * each of its levels. */

@@ -68,6 +68,21 @@ static void add_rmse(struct psr_msg_frame_end *end, unsigned id, const struct bu
 		add_entry(end, id, 0, (uint64_t)llround(price->rmse * PSR_WIRE_RMSE_ONE));
 }
 
+/* Names the beginning that lacks most levels. */
+static void add_levels(struct psr_msg_frame_end *end, const struct scene *scene)
+{
+	struct psr_model_prefix most = { 0 };
+
+	for (uint32_t i = 0; i < scene->n_models; i++) {
+		const struct psr_model_prefix *prefix = &scene->model[i]->card.prefix;
+
+		if (prefix->of_levels - prefix->levels > most.of_levels - most.levels)
+			most = *prefix;
+	}
+	if (most.levels > 0)
+		add_entry(end, PSR_WIRE_REPORT_LEVELS, 0, most.levels | most.of_levels << 8);
+}
+
 struct times { /* clock_ns() */
 	uint64_t start_ns, drawn_ns, end_ns;
 };
@@ -107,6 +122,7 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_rmse(end, PSR_WIRE_REPORT_RMSE_CHOSEN, &d->choice.chosen);
 	add_rmse(end, PSR_WIRE_REPORT_RMSE_CHEAPER, &d->choice.cheaper);
 	add_rmse(end, PSR_WIRE_REPORT_RMSE_BETTER, &d->choice.better);
+	add_levels(end, d->scene);
 	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }

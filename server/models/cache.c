@@ -106,7 +106,7 @@ int cache_find(uint64_t *bytes, const char *path)
 	if (lstat(path, &status) != 0 || !S_ISREG(status.st_mode) || status.st_uid != geteuid())
 		return 0;
 	*bytes = (uint64_t)status.st_size;
-	psr_model_need(bytes, path, NULL); /* if that fails the size stays */
+	psr_model_need(bytes, path, 0, NULL); /* if that fails the size stays */
 	return 1;
 }
 

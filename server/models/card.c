@@ -40,6 +40,7 @@ int card_init(struct card *card, const struct psr_model *model)
 		card->representations |= 1u << PSR_WIRE_REP_DPOINT;
 		card->n_points = points->groups.n_blocks;
 	}
+	psr_model_is_prefix(model, &card->prefix);
 	psr_model_content_id(model, card->content_id);
 	card->presets.camera = copy(presets->camera, presets->n_cameras, sizeof *presets->camera);
 	card->presets.light = copy(presets->light, presets->n_lights, sizeof *presets->light);

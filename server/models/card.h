@@ -14,6 +14,7 @@ struct card {
 	uint32_t n_levels;        /* these of what is drawn where nobody names a representation */
 	uint32_t n_blocks, n_cubes, n_points; /* of blocks, of the octree, groups of differential points; 0 without */
 	uint64_t n_samples;
+	struct psr_model_prefix prefix; /* zeros of a whole file */
 	int has_sheer; /* some samples let a part of the light through */
 	int is_calibrated; /* its blocks' ladder is measured (model/calibration.h) */
 };

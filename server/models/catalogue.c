@@ -91,11 +91,11 @@ struct catalogue_entry *catalogue_find(struct catalogue *catalogue, const char *
 	return bsearch(name, catalogue->entry, catalogue->n, sizeof *catalogue->entry, compare_name);
 }
 
-struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution)
+struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution, uint32_t levels)
 {
 	struct catalogue_model *model = entry->model;
 
-	while (model != NULL && model->resolution != resolution)
+	while (model != NULL && (model->resolution != resolution || model->levels != levels))
 		model = model->of_entry;
 	return model;
 }

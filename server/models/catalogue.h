@@ -23,7 +23,6 @@
 #include "base/pool.h"
 
 #define CATALOGUE_MAX_FILES 65536
-#define CATALOGUE_FIRST_LOOK 64
 #define CATALOGUE_KEY 33 /* 32 hexadecimal digits and the NUL */
 
 struct catalogue_file {
@@ -32,7 +31,7 @@ struct catalogue_file {
 	int is_source;           /* psrd must build a model of it first */
 	int is_nested;           /* in a subfolder */
 	int is_broken;           /* a .psr with a bad header; opening it says why */
-	int has_coarse;          /* a .psr whose beginning is enough for pictures of CATALOGUE_FIRST_LOOK pixels */
+	uint32_t beginnings;     /* of a .psr: psr_model_beginnings() */
 	char *reason;            /* why psrd cannot serve it, for people; NULL: it can */
 	uint64_t bytes;          /* including the files that a source names */
 	uint64_t device, inode;
@@ -43,7 +42,8 @@ struct catalogue_model;
 
 struct catalogue_entry {
 	struct catalogue_file file;
-	struct catalogue_model *model; /* head of a list, the latest first; a source has one model for each resolution */
+	struct catalogue_model *model; /* head of a list, the latest first; a source has one for each resolution, a .psr one
+	                                * for each beginning */
 	uint8_t content_id[16];        /* of the latest model; zero: unknown */
 	int has_failed;                /* the last attempt to read or build it failed */
 };
@@ -72,8 +72,8 @@ struct catalogue_model {
 	struct catalogue_entry *entry; /* NULL: its file has changed or is gone */
 	struct catalogue_model *of_entry; /* next model of the same entry */
 	char key[CATALOGUE_KEY];       /* of a built model, else "" */
-	uint32_t resolution;           /* of its build; 0: it came from a .psr file; CATALOGUE_FIRST_LOOK without a key: of the
-	                                * beginning of that */
+	uint32_t resolution;           /* of its build; 0: it came from a .psr file */
+	uint32_t levels;               /* of the beginning of that file; 0: all of it */
 	int is_stale;                  /* its source may have changed since it was built */
 	uint64_t bytes;                /* memory that it takes, or took before it left */
 	uint32_t n_users, n_pins;
@@ -139,8 +139,8 @@ void catalogue_unclaim(struct catalogue *catalogue, struct catalogue_claim *clai
  * do not starve. */
 int catalogue_overtake(struct catalogue *catalogue);
 
-/* Returns the entry's model of this resolution (0: from a .psr file), or NULL. */
-struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution);
+/* Returns the entry's model of this resolution (0: from a .psr file) and of so many levels (0: all), or NULL. */
+struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution, uint32_t levels);
 
 int catalogue_is_loaded(const struct catalogue_entry *entry); /* one of the entry's models is in memory */
 
@@ -148,12 +148,13 @@ struct catalogue_loaded {
 	struct catalogue_entry *entry; /* NULL: the entry is gone */
 	struct psr_model *model;       /* a reference; catalogue_add() takes it */
 	const char *key;               /* of a built model; else "" */
-	uint32_t resolution;           /* 0: it came from a .psr file */
+	uint32_t resolution, levels;   /* as in struct catalogue_model */
 	uint64_t reserved;             /* bytes reserved for the model */
 };
 
-/* Adds a model in place of its reservation. It replaces the entry's model of this resolution; if that has the same
- * content, the old one comes back into memory instead. *out is one user's reference. MEMORY: the model is released. */
+/* Adds a model in place of its reservation. It replaces the entry's model of this resolution and levels; if that has
+ * the same content, the old one comes back into memory instead. *out is one user's reference. MEMORY: the model is
+ * released. */
 int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, const struct catalogue_loaded *loaded);
 
 /* Takes a model that has come back (a reference) in place of its reservation; its content must be that of the card. */

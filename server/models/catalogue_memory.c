@@ -248,6 +248,7 @@ static struct catalogue_model *create(const struct catalogue_loaded *loaded)
 		return NULL;
 	}
 	model->resolution = loaded->resolution;
+	model->levels = loaded->levels;
 	strncpy(model->key, loaded->key, sizeof model->key - 1);
 	return model;
 }
@@ -264,7 +265,7 @@ static int is_same(const struct catalogue_model *model, const struct catalogue_l
 /* Replaces the entry's old model. */
 static void enter(struct catalogue *catalogue, struct catalogue_model *model, struct catalogue_entry *entry)
 {
-	struct catalogue_model *old = catalogue_model(entry, model->resolution);
+	struct catalogue_model *old = catalogue_model(entry, model->resolution, model->levels);
 
 	if (old != NULL)
 		catalogue_detach(catalogue, old);
@@ -277,7 +278,7 @@ static void enter(struct catalogue *catalogue, struct catalogue_model *model, st
 int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, const struct catalogue_loaded *loaded)
 {
 	struct catalogue_entry *entry = loaded->entry;
-	struct catalogue_model *model = entry != NULL ? catalogue_model(entry, loaded->resolution) : NULL;
+	struct catalogue_model *model = entry != NULL ? catalogue_model(entry, loaded->resolution, loaded->levels) : NULL;
 
 	if (model == NULL || !is_same(model, loaded)) {
 		model = create(loaded);

@@ -65,7 +65,7 @@ int catalogue_is_cloud(const char *file_name)
 /* A valid name is one that LIST_ENTRY can carry. */
 static int is_clean(const char *name)
 {
-	struct psr_msg_open msg = { 0, "" };
+	struct psr_msg_open msg = { .resolution = 0 };
 	uint8_t bytes[512];
 	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
 
@@ -161,8 +161,8 @@ static int consider(struct list *list, const char *file_name, char *path, const 
 		free(path);
 		return PSR_ERR_MEMORY;
 	}
-	file.has_coarse = ending == 0 && advice == NULL && psr_model_has_coarse(path, CATALOGUE_FIRST_LOOK);
-	file.is_broken = ending == 0 && advice == NULL && psr_model_need(&need, path, NULL) != PSR_OK;
+	file.beginnings = ending == 0 && advice == NULL ? psr_model_beginnings(path) : 0;
+	file.is_broken = ending == 0 && advice == NULL && psr_model_need(&need, path, 0, NULL) != PSR_OK;
 	return add(list, &file);
 }
 

@@ -122,7 +122,8 @@ void opener_end(struct opening *o, struct catalogue_model *model, const struct p
 	destroy_opening(o);
 }
 
-static struct opening *start(struct opener *opener, const struct catalogue_entry *entry, uint32_t resolution)
+static struct opening *start(struct opener *opener, const struct catalogue_entry *entry, uint32_t resolution,
+                             uint32_t levels)
 {
 	struct opening *o = calloc(1, sizeof *o);
 
@@ -133,6 +134,7 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	o->cache = opener->parts.cache;
 	o->max_cache = opener->parts.max_cache;
 	o->resolution = resolution;
+	o->levels = levels;
 	o->file = entry->file;
 	o->file.path = strdup(entry->file.path);
 	if (o->file.path == NULL) {
@@ -157,19 +159,28 @@ static uint32_t find_resolution(const struct opener_parts *parts, uint32_t pixel
 	return step < most && (pixels != most || is_cloud) ? step : most;
 }
 
-/* Has `who` wait for the entry's model of this resolution. MEMORY. */
-static int wait_for(struct opener *opener, const struct catalogue_entry *entry, uint32_t resolution,
+/* Finds the shortest beginning of at least so many levels. Returns its levels; 0: all of the file is needed. */
+static uint32_t find_levels(const struct catalogue_file *file, uint32_t levels)
+{
+	const uint32_t enough = file->beginnings >> levels;
+
+	return levels > 0 && enough != 0 ? levels + (uint32_t)__builtin_ctz(enough) : 0;
+}
+
+/* Has `who` wait for the entry's model of this resolution and levels. MEMORY. */
+static int wait_for(struct opener *opener, const struct catalogue_entry *entry, uint32_t resolution, uint32_t levels,
                     const struct waiter *who)
 {
 	struct opening *o = opener->first;
 	struct waiter *waiter = malloc(sizeof *waiter);
 	int is_new;
 
-	while (o != NULL && (o->resolution != resolution || strcmp(o->file.path, entry->file.path) != 0))
+	while (o != NULL && (o->resolution != resolution || o->levels != levels
+	                     || strcmp(o->file.path, entry->file.path) != 0))
 		o = o->next;
 	is_new = o == NULL;
 	if (waiter != NULL && is_new)
-		o = start(opener, entry, resolution);
+		o = start(opener, entry, resolution, levels);
 	if (waiter == NULL || o == NULL) {
 		free(waiter);
 		return PSR_ERR_MEMORY;
@@ -191,7 +202,7 @@ void opener_open(struct opener *opener, void *client, uint32_t id, const struct 
 	struct catalogue_entry *entry = catalogue_find(opener->parts.catalogue, msg->name);
 	struct catalogue_model *model;
 	char text[PSR_ERROR_TEXT];
-	uint32_t resolution;
+	uint32_t resolution = 0, levels = 0;
 
 	if (entry == NULL) {
 		snprintf(text, sizeof text, "there is no model %.255s; psr list shows all", msg->name);
@@ -202,16 +213,14 @@ void opener_open(struct opener *opener, void *client, uint32_t id, const struct 
 		user->on_refused(client, id, PSR_ERR_UNSUPPORTED, entry->file.reason);
 		return;
 	}
-	resolution = 0;
 	if (entry->file.is_source)
 		resolution = find_resolution(&opener->parts, msg->resolution, catalogue_is_cloud(entry->file.path));
-	else if (entry->file.has_coarse && msg->resolution > 0 && msg->resolution <= CATALOGUE_FIRST_LOOK
-	         && opener->parts.resolution <= CATALOGUE_FIRST_LOOK)
-		resolution = CATALOGUE_FIRST_LOOK;
-	model = catalogue_model(entry, resolution);
+	else
+		levels = find_levels(&entry->file, msg->levels);
+	model = catalogue_model(entry, resolution, levels);
 	if (model != NULL && !model->is_stale)
 		user->on_opened(client, id, model);
-	else if (wait_for(opener, entry, resolution, &waiter) != PSR_OK)
+	else if (wait_for(opener, entry, resolution, levels, &waiter) != PSR_OK)
 		user->on_refused(client, id, PSR_ERR_MEMORY, "no memory to open a model");
 }
 
@@ -221,7 +230,7 @@ int opener_rebuild(struct opener *opener, struct catalogue_model *model)
 
 	if (opener->is_stopped)
 		return PSR_ERR_CANCELLED;
-	return wait_for(opener, model->entry, model->resolution, &waiter);
+	return wait_for(opener, model->entry, model->resolution, 0, &waiter);
 }
 
 static int remove_waiters(struct opener *opener, const void *client, uint32_t id, int all)
@@ -242,6 +251,8 @@ static int remove_waiters(struct opener *opener, const void *client, uint32_t id
 				at = &waiter->next;
 			}
 		}
+		if (o->waiters == NULL && o->is_loading)
+			atomic_store(&o->is_stopped, 1);
 	}
 	return n;
 }
@@ -279,6 +290,7 @@ void opener_stop(struct opener *opener, int code, const char *text)
 	psr_fail(&error, code, "%s", text);
 	opener->is_stopped = 1;
 	for (struct opening *o = opener->first; o != NULL; o = o->next) {
+		atomic_store(&o->is_stopped, 1);
 		while (o->waiters != NULL) {
 			struct waiter waiter = *o->waiters;
 

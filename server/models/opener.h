@@ -40,8 +40,8 @@ void opener_open(struct opener *opener, void *client, uint32_t id, const struct 
  * opener_forget() is called for the model. MEMORY, CANCELLED: does not call it. */
 int opener_rebuild(struct opener *opener, struct catalogue_model *model);
 
-/* Stops waiting; returns 1 if `id` was waiting. A build that nobody waits for ends after a second; all other work goes
- * on, for the next request. */
+/* Stops waiting; returns 1 if `id` was waiting. A build that nobody waits for ends after a second, the unpacking of an
+ * octree at once; all other work goes on, for the next request. */
 int opener_cancel(struct opener *opener, const void *client, uint32_t id);
 void opener_forget(struct opener *opener, const void *client); /* the client is gone: calls nothing for it any more */
 void opener_tick(struct opener *opener);                       /* call it on the loop's ticks */

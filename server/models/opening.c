@@ -1,9 +1,11 @@
 #define _GNU_SOURCE
 #include <errno.h>
 #include <inttypes.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "base/clock.h"
@@ -12,9 +14,49 @@
 #include "cachekey.h"
 #include "opening.h"
 
+/* What takes so much memory is read on all cores for up to many seconds. Threads of a nice value of 5 get a third of
+ * what those of frames get, where these want the cores, too: setpriority(2), sched(7). */
+#define LARGE_BYTES ((uint64_t)16 << 20)
+#define LARGE_NICE 5
+
 static void post(struct opening *o)
 {
 	loop_post(o->loop, &o->note);
+}
+
+static int is_stopped(void *userdata)
+{
+	const struct opening *o = userdata;
+
+	return atomic_load_explicit(&o->is_stopped, memory_order_relaxed);
+}
+
+static void *read_model(void *userdata)
+{
+	struct opening *o = userdata;
+	const struct psr_cancel cancel = { is_stopped, o };
+
+	if (o->bytes >= LARGE_BYTES) /* of this thread, and of those that it starts */
+		setpriority(PRIO_PROCESS, (id_t)gettid(), LARGE_NICE);
+	o->code = psr_model_read_levels(&o->model, o->file.is_source ? o->cached : o->file.path, o->levels, &cancel,
+	                                &o->error);
+	/* Here, and not with the first frame: the catalogue counts them. */
+	if (o->code == PSR_OK && (o->code = psr_model_make_cubes(o->model, &o->error)) != PSR_OK) {
+		psr_model_unref(o->model);
+		o->model = NULL;
+	}
+	return NULL;
+}
+
+/* A thread cannot raise its priority again: one of its own reads what is large. */
+static void read_aside(struct opening *o)
+{
+	pthread_t thread;
+
+	if (o->bytes >= LARGE_BYTES && pthread_create(&thread, NULL, read_model, o) == 0)
+		pthread_join(thread, NULL);
+	else
+		read_model(o);
 }
 
 void opening_load(void *userdata)
@@ -28,15 +70,8 @@ void opening_load(void *userdata)
 		cache_trim(o->cache, o->max_cache, (const char(*)[CATALOGUE_KEY])o->in_use, o->n_in_use);
 	else if (o->file.is_source)
 		cache_touch(o->cached);
-	if (o->code == PSR_OK && o->file.is_source)
-		o->code = psr_model_read(&o->model, o->cached, &o->error);
-	else if (o->code == PSR_OK)
-		o->code = psr_model_read_coarse(&o->model, o->file.path, o->resolution, &o->error);
-	/* Here, and not with the first frame: the catalogue counts them. */
-	if (o->code == PSR_OK && (o->code = psr_model_make_cubes(o->model, &o->error)) != PSR_OK) {
-		psr_model_unref(o->model);
-		o->model = NULL;
-	}
+	if (o->code == PSR_OK)
+		read_aside(o);
 	post(o);
 }
 
@@ -99,7 +134,7 @@ void opening_prepare(void *userdata)
 	o->code = PSR_OK;
 	if (o->file.is_source)
 		o->code = prepare_source(o);
-	else if (psr_model_need(&need, o->file.path, NULL) == PSR_OK)
+	else if (psr_model_need(&need, o->file.path, o->levels, NULL) == PSR_OK)
 		o->bytes = need;
 	else if (stat(o->file.path, &status) == 0) /* loading it will say what is wrong */
 		o->bytes = (uint64_t)status.st_size;

@@ -4,6 +4,7 @@
 #define PSRD_OPENING_H
 
 #include <limits.h>
+#include <stdatomic.h>
 #include "catalogue.h"
 #include "server/net/loop.h"
 #include "opener.h"
@@ -28,13 +29,15 @@ struct opening {
 	const char *cache;          /* folder */
 	uint64_t max_cache;
 	struct catalogue_file file; /* its path is a copy */
-	uint32_t resolution;        /* at which a source is built; of a .psr file 0, or CATALOGUE_FIRST_LOOK: its beginning */
+	uint32_t resolution;        /* at which a source is built; 0 of a .psr file */
+	uint32_t levels;            /* of the beginning of a .psr file; 0: all of it */
 	struct waiter *waiters;
 	struct psr_msg_progress progress;
 	struct loop_note note;
 	struct catalogue_claim claim;  /* of room for the model */
-	int has_job, is_building;
+	int has_job, is_building, is_loading;
 	uint64_t unwanted_us;          /* since when nobody has waited; 0: somebody does */
+	atomic_int is_stopped;         /* the job that loads is to end */
 	/* Belong to the job while one runs: */
 	char program[PATH_MAX], key[CATALOGUE_KEY];
 	char *cached, *temporary;   /* for a source: its model's path in the cache, and the path where it is built */

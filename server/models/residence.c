@@ -14,7 +14,6 @@ struct coming { /* a model on its way back; counts as one of its users */
 	struct residence_need *first; /* needs that wait for it; they have pins, unless it is built again */
 	struct loop_note note;
 	uint64_t reserved;
-	uint32_t pixels; /* of the beginning of a file: for pictures so large; 0: all of it */
 	int is_rebuilding;
 	/* Belong to the job: */
 	char *path;
@@ -86,7 +85,7 @@ static void read_job(void *userdata)
 	struct coming *coming = userdata;
 	uint8_t content_id[16];
 
-	coming->code = psr_model_read_coarse(&coming->read, coming->path, coming->pixels, &coming->error);
+	coming->code = psr_model_read_levels(&coming->read, coming->path, coming->model->levels, NULL, &coming->error);
 	if (coming->code == PSR_OK) {
 		psr_model_content_id(coming->read, content_id);
 		if (memcmp(content_id, coming->model->card.content_id, sizeof content_id) != 0) {
@@ -115,7 +114,6 @@ static void start_coming(struct residence *residence, struct catalogue_model *mo
 
 	if (coming != NULL) {
 		*coming = (struct coming){ .residence = residence, .model = model, .reserved = model->bytes,
-			                       .pixels = model->key[0] == '\0' ? model->resolution : 0,
 			                       .path = cache_model_path(residence->parts.cache, model) };
 		coming->note = (struct loop_note){ .fn = on_read, .userdata = coming };
 	}

@@ -51,6 +51,7 @@ static void name_error(struct opening *o)
 }
 
 static void build(struct opening *o);
+static void load(struct opening *o);
 
 static int is_lost(int code)
 {
@@ -73,12 +74,17 @@ static void on_loaded(void *userdata)
 	struct opening *o = userdata;
 	struct catalogue *catalogue = o->opener->parts.catalogue;
 	struct catalogue_loaded loaded = { .entry = opener_entry(o), .model = o->model, .key = o->key,
-		                               .resolution = o->resolution, .reserved = o->reserved };
+		                               .resolution = o->resolution, .levels = o->levels, .reserved = o->reserved };
 	struct catalogue_model *added;
 
-	o->has_job = 0;
+	o->has_job = o->is_loading = 0;
 	o->reserved = 0;
 	o->model = NULL;
+	if (o->code == PSR_ERR_CANCELLED && o->waiters != NULL && !o->opener->is_stopped) {
+		catalogue_release(catalogue, loaded.reserved);
+		load(o); /* a new request came while the job was ending */
+		return;
+	}
 	if (o->code != PSR_OK) {
 		catalogue_release(catalogue, loaded.reserved);
 		if (o->is_cached && is_lost(o->code) && !o->opener->is_stopped) {
@@ -133,6 +139,8 @@ static int try_load(void *userdata)
 		return 1;
 	}
 	o->reserved = o->bytes;
+	o->is_loading = 1;
+	atomic_store(&o->is_stopped, o->opener->is_stopped || o->waiters == NULL);
 	opener_progress(o, &(struct psr_msg_progress){ .stage = PSR_PROGRESS_LOAD });
 	submit(o, opening_load, on_loaded);
 	return 1;
@@ -168,7 +176,7 @@ static void on_built(const struct psr_error *failure, void *userdata)
 	} else {
 		o->was_built = 1;
 		o->bytes = (uint64_t)status.st_size;
-		psr_model_need(&o->bytes, o->temporary, NULL); /* if that fails the size stays, and loading says what is wrong */
+		psr_model_need(&o->bytes, o->temporary, 0, NULL); /* if that fails the size stays; loading says what is wrong */
 		list_in_use(o);
 		load(o);
 	}
@@ -195,7 +203,7 @@ static int answer_known(struct opening *o)
 {
 	struct catalogue *catalogue = o->opener->parts.catalogue;
 	struct catalogue_entry *entry = opener_entry(o);
-	struct catalogue_model *model = entry != NULL ? catalogue_model(entry, o->resolution) : NULL;
+	struct catalogue_model *model = entry != NULL ? catalogue_model(entry, o->resolution, o->levels) : NULL;
 
 	if (!o->file.is_source || model == NULL)
 		return 0;

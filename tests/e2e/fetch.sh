@@ -52,6 +52,21 @@ check "and makes the whole file" cmp few.psr ball.psr
 refuses "levels of a file that has none" 2 "has no levels to end at" fetch teapot --level 3 -o none.psr
 rm -f said none.psr.part
 
+# What psrd draws of these levels is what the part of the file is.
+shot() { psr shot --server "$server" --size 96x96 "$@"; }
+psr fetch --server "$server" ball --level 6 -o first.psr >/dev/null
+check "the first levels are drawn" shot --model ball --level 5 --report r.json -o levels.ppm
+check "from the same model as from the part of the file" \
+	[ "$(jq -r .model.content_id r.json)" = "$(psr-model info first.psr --json | jq -r .content_id)" ]
+is "and the report names them" "6 8 6" \
+	"$(jq -r '"\(.model.octree_levels) \(.model.of_levels) \(.request.models[0].octree_levels)"' r.json)"
+check "a replay draws them again" psr shot --server "$server" --replay r.json -o again.ppm
+check "byte for byte" cmp levels.ppm again.ppm
+check "without a level psrd draws the whole" shot --model ball --report r.json -o whole.ppm
+is "whose report names none" null "$(jq .model.octree_levels r.json)"
+check "which is another picture" bash -c '! cmp -s levels.ppm whole.ppm'
+rm -f first.psr r.json *.ppm
+
 # Breaks: each connection is reset after so many bytes.
 start_relay --reset-down 150000 --rate-down 16 --split 5000
 refuses "a connection that is reset ends it" 6 "." psr fetch --server "$through" ball -o broken.psr

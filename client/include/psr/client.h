@@ -78,6 +78,11 @@ int psr_client_list(struct psr_client *client, struct psr_msg_list_entry **entri
  * the resolution. 0, the default: the server decides. Servers without PSR_CAP_RESOLUTION are not told. */
 void psr_client_set_resolution(struct psr_client *client, uint32_t pixels);
 
+/* Has models opened from now on be the first levels of packed octrees, at least so many where the file can be cut
+ * there: a coarser model that is there at once. OPENED tells the levels. 0, the default: all. Servers without
+ * PSR_CAP_LEVELS are not told. */
+void psr_client_set_levels(struct psr_client *client, uint32_t levels);
+
 /* psr_client_open() calls fn while the server builds or loads. NULL, the default: it calls nothing. */
 void psr_client_on_progress(struct psr_client *client,
                             void (*fn)(const struct psr_msg_progress *progress, void *userdata), void *userdata);

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "error.h"
+#include "pool.h"
 #include "view.h"
 
 #ifdef __cplusplus
@@ -45,16 +46,22 @@ struct psr_model;
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
-/* psr_model_read() for a first picture of so many pixels: of a packed octree it reads the first levels, as many as that
- * picture needs, and makes the model that these are, as of a file that ends there (psr_model_is_prefix()). */
-int psr_model_read_coarse(struct psr_model **out, const char *path, uint32_t pixels, struct psr_error *err);
-/* Returns whether it would read less than all. */
-int psr_model_has_coarse(const char *path, uint32_t pixels);
+/* A packed octree goes down the file in steps, and what ends with a step is a model of fewer levels, as of a file that
+ * is cut off there (psr_model_is_prefix()). Returns bit l for each such beginning, of l levels; the whole is none of
+ * them. 0: there are none, or the file is damaged before them. */
+uint32_t psr_model_beginnings(const char *path);
 
-/* Reads from the header how much memory this file's model takes once it is drawn; a packed file takes more than its size.
- * What is drawn of an octree beside its file's sections is an estimate; bounds of differential points are not in it.
- * Errors as of psr_model_read(), as far as the header shows them. */
-int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err);
+/* psr_model_read() of the shortest beginning of at least so many levels; of all, if there is none or levels is 0. A
+ * beginning takes time by its own size. `cancel` (NULL: nobody) stops the unpacking of an octree, within some tenths of
+ * a second for the largest: CANCELLED. */
+int psr_model_read_levels(struct psr_model **out, const char *path, uint32_t levels, const struct psr_cancel *cancel,
+                          struct psr_error *err);
+
+/* Reads from the header how much memory the model of this file, or of the beginning that psr_model_read_levels() takes,
+ * needs once it is drawn; a packed file takes more than its size. What is drawn of an octree beside its file's sections
+ * is an estimate, and so is a beginning; bounds of differential points are not in it. Errors as of psr_model_read(), as
+ * far as the header shows them. */
+int psr_model_need(uint64_t *n_bytes, const char *path, uint32_t levels, struct psr_error *err);
 
 /* Cameras and lights of the source file, in object coordinates; the model owns them. */
 struct psr_presets {

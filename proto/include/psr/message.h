@@ -13,6 +13,7 @@ extern "C" {
 
 #define PSR_WIRE_MAX_NAME 255          /* bytes of UTF-8 */
 #define PSR_WIRE_MAX_SIDE 16384        /* pixels */
+#define PSR_WIRE_MAX_LEVELS 31         /* of an octree */
 #define PSR_WIRE_MAX_PIXELS 67108864u  /* 64 Mpixel */
 #define PSR_WIRE_MAX_INSTANCES 1024
 #define PSR_WIRE_MAX_LIGHTS 32
@@ -52,6 +53,7 @@ enum psr_cap {
 	PSR_CAP_SHARP = 1 << 22,       /* FRAME with PSR_WIRE_FRAME_SHARP; needs VIEWS */
 	PSR_CAP_RMSE_BOUND = 1 << 23,
 	PSR_CAP_BOUND = 1 << 24,       /* the plane of bounds */
+	PSR_CAP_LEVELS = 1 << 25,      /* OPEN of the first levels of a packed octree */
 };
 
 /* ---- the session ---- */
@@ -99,8 +101,9 @@ struct psr_msg_progress { /* any number of these before OPENED; stages never go 
 enum psr_wire_rep { PSR_WIRE_REP_AUTO = 0, PSR_WIRE_REP_BLOCKS = 1, PSR_WIRE_REP_OCTREE = 2, PSR_WIRE_REP_DPOINT = 3 };
 struct psr_msg_opened {
 	uint32_t handle;          /* not 0; of this connection */
-	uint32_t representations; /* bit r: the model has representation r of enum psr_wire_rep; not 0, bit 0 is 0;
+	uint16_t representations; /* bit r: the model has representation r of enum psr_wire_rep; not 0, bit 0 is 0;
 	                           * receivers ignore unknown bits */
+	uint8_t octree_levels, of_levels; /* of a beginning: levels of its octree, and of the whole file's; else both 0 */
 	uint8_t content_id[16];
 	double box_min[3], box_max[3]; /* around the samples, in object coordinates (those of the source file) */
 	double origin[3];
@@ -281,6 +284,8 @@ enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts
 	                                   * PSR_WIRE_RMSE_ONE; left out where nobody can foresee it */
 	PSR_WIRE_REPORT_RMSE_CHEAPER = 43,
 	PSR_WIRE_REPORT_RMSE_BETTER = 44,
+	PSR_WIRE_REPORT_LEVELS = 45, /* drawn of the octree that lacks most: bits 0-7 its levels, 8-15 of its whole file;
+	                              * left out where no model is a beginning */
 	PSR_WIRE_REPORT_EFFECTS = 64, /* plus the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
 #define PSR_WIRE_RMSE_ONE 65536

@@ -127,7 +127,7 @@ static void octrees_survive_file_map_and_packing(void **state)
 			psr_model_content_id(models[i], id);
 			psr_model_content_id(model, other);
 			assert_memory_equal(id, other, sizeof id);
-			assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+			assert_int_equal(psr_model_need(&need, path, 0, NULL), PSR_OK);
 			/* Nobody has drawn it yet. */
 			assert_null(psr_model_cubes(model));
 			const uint64_t opened = psr_model_bytes(model);

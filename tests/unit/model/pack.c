@@ -148,11 +148,11 @@ static void either_way_of_opening_gives_the_same_model(void **state)
 			assert_int_equal(psr_model_bytes(opened[k]), psr_model_bytes(models[i]));
 			psr_model_unref(opened[k]);
 		}
-		assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+		assert_int_equal(psr_model_need(&need, path, 0, NULL), PSR_OK);
 		assert_int_equal(need, psr_model_bytes(models[i]));
 		/* And from packed to plain again. */
 		assert_int_equal(psr_model_write(models[i], path, NULL), PSR_OK);
-		assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+		assert_int_equal(psr_model_need(&need, path, 0, NULL), PSR_OK);
 		assert_int_equal(need, psr_model_bytes(models[i]));
 		assert_int_equal(psr_model_read(&opened[0], path, NULL), PSR_OK);
 		assert_int_equal(psr_model_file_bytes(opened[0], &is_packed), n_image);

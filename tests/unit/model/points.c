@@ -75,7 +75,7 @@ static void points_survive_file_map_and_packing(void **state)
 			psr_model_content_id(models[i], id);
 			psr_model_content_id(model, other);
 			assert_memory_equal(id, other, sizeof id);
-			assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+			assert_int_equal(psr_model_need(&need, path, 0, NULL), PSR_OK);
 			assert_int_equal(need + psr_model_points(model)->n_bytes, psr_model_bytes(model));
 			psr_model_unref(model);
 			unlink(path);

@@ -181,11 +181,102 @@ static void a_cut_file_on_disk_needs_no_more_memory_than_it_says(void **state)
 	assert_non_null(file);
 	assert_int_equal(fwrite(packed[0], 1, n, file), n);
 	fclose(file);
-	assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+	assert_int_equal(psr_model_need(&need, path, 0, NULL), PSR_OK);
 	assert_int_equal(psr_model_read(&model, path, NULL), PSR_OK);
 	size_t n_image;
 	model_image(model, &n_image);
 	assert_true(n_image <= need);
+	psr_model_unref(model);
+	unlink(path);
+	rmdir(folder);
+}
+
+static void write_packed(char folder[], char path[64])
+{
+	FILE *file;
+
+	assert_non_null(mkdtemp(folder));
+	snprintf(path, 64, "%s/a.psr", folder);
+	file = fopen(path, "wb");
+	assert_non_null(file);
+	assert_int_equal(fwrite(packed[0], 1, n_packed[0], file), n_packed[0]);
+	fclose(file);
+}
+
+static void the_shortest_beginning_of_enough_levels_is_read(void **state)
+{
+	char folder[] = "/tmp/psr-model-XXXXXX", path[64];
+	uint64_t before = 0;
+
+	(void)state;
+	write_packed(folder, path);
+	for (uint32_t levels = 0; levels <= LEVELS + 1; levels++) {
+		struct psr_model_prefix prefix;
+		struct psr_model *model;
+		uint64_t need;
+		int s = 0;
+
+		while (levels > 0 && s < n_steps - 1 && step[s].depth < (int)levels)
+			s++;
+		s = levels == 0 ? n_steps - 1 : s;
+		assert_int_equal(psr_model_read_levels(&model, path, levels, NULL, NULL), PSR_OK);
+		assert_int_equal(psr_model_octree(model)->levels, step[s].depth);
+		assert_int_equal(psr_model_is_prefix(model, &prefix), s < n_steps - 1);
+		assert_int_equal(psr_model_need(&need, path, levels, NULL), PSR_OK);
+		assert_true(levels == 0 || need >= before);
+		before = levels > 0 ? need : 0;
+		/* Each beginning has as many leaves and codes as it says, and at most a third of its leaves' nodes in the skip
+		 * index, 24 bytes each. */
+		assert_true(psr_model_bytes(model) <= need + need / 2 + 24 * step[s].n_leaves / 3);
+		psr_model_unref(model);
+	}
+	unlink(path);
+	rmdir(folder);
+}
+
+static void beginnings_are_the_steps_but_the_last(void **state)
+{
+	char folder[] = "/tmp/psr-model-XXXXXX", path[64];
+	uint32_t levels = 0;
+
+	(void)state;
+	write_packed(folder, path);
+	for (int s = 0; s < n_steps - 1; s++)
+		levels |= 1u << step[s].depth;
+	assert_int_equal(psr_model_beginnings(path), levels);
+	assert_int_equal(truncate(path, (off_t)n_packed[0] - 1), 0);
+	assert_int_equal(psr_model_beginnings(path), 0);
+	unlink(path);
+	assert_int_equal(psr_model_beginnings(path), 0);
+	rmdir(folder);
+}
+
+static int asked;
+static int says_at(void *after)
+{
+	return asked++ >= *(const int *)after;
+}
+
+static void reading_ends_at_any_question(void **state)
+{
+	char folder[] = "/tmp/psr-model-XXXXXX", path[64];
+	struct psr_model *model = NULL;
+	int after = 0, code;
+
+	(void)state;
+	write_packed(folder, path);
+	do {
+		const struct psr_cancel cancel = { says_at, &after };
+		struct psr_error err = { .text = "" };
+
+		asked = 0;
+		code = psr_model_read_levels(&model, path, 0, &cancel, &err);
+		assert_true(code == PSR_OK || code == PSR_ERR_CANCELLED);
+		assert_int_equal(code == PSR_OK, err.text[0] == '\0');
+		after++;
+	} while (code != PSR_OK && after < 1000);
+	assert_int_equal(code, PSR_OK);
+	assert_true(after > 2 * n_steps); /* each step of each chunk asked */
 	psr_model_unref(model);
 	unlink(path);
 	rmdir(folder);
@@ -277,6 +368,9 @@ int main(void)
 		cmocka_unit_test(a_file_cut_at_any_length_is_its_coarser_model_or_refused),
 		cmocka_unit_test(its_model_is_that_of_the_coarser_tree),
 		cmocka_unit_test(a_cut_file_on_disk_needs_no_more_memory_than_it_says),
+		cmocka_unit_test(the_shortest_beginning_of_enough_levels_is_read),
+		cmocka_unit_test(beginnings_are_the_steps_but_the_last),
+		cmocka_unit_test(reading_ends_at_any_question),
 		cmocka_unit_test(a_piece_that_is_damaged_is_named),
 		cmocka_unit_test(lies_are_refused_even_under_right_hashes),
 		cmocka_unit_test(a_huge_rest_is_not_believed),

@@ -58,7 +58,8 @@ static void threads_pack_the_same_bytes_and_unpack_the_same_tree(void **state)
 	assert_int_equal(octree_pack(&other, &n_other, tree, OCTREE_FAST, pool, NULL), PSR_OK);
 	assert_int_equal(n, n_other);
 	assert_memory_equal(bytes, other, n);
-	assert_int_equal(octree_unpack(&again, bytes, n, tree->n_leaves, pool, NULL), PSR_OK);
+	assert_int_equal(octree_unpack(&again, bytes, n, tree->n_leaves, &(struct octree_crew){ .pool = pool }, NULL),
+	                 PSR_OK);
 	assert_same(tree, again);
 	octree_packed_shares(&shares, bytes, n);
 	assert_int_equal(shares.codes + shares.stream[0] + shares.stream[1] + shares.stream[2], n);

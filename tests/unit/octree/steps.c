@@ -118,7 +118,7 @@ static void steps_of_several_chunks_are_the_same_with_threads(void **state)
 	assert_int_equal(octree_pack(&bytes, &n, p.tree, OCTREE_FAST | OCTREE_STEPS, pool, NULL), PSR_OK);
 	assert_int_equal(n, p.n);
 	assert_memory_equal(bytes, p.bytes, n);
-	assert_int_equal(octree_unpack(&begun, bytes, n, UINT64_MAX, pool, NULL), PSR_OK);
+	assert_int_equal(octree_unpack(&begun, bytes, n, UINT64_MAX, &(struct octree_crew){ .pool = pool }, NULL), PSR_OK);
 	assert_same(begun, p.tree);
 	octree_destroy(begun);
 	free(bytes);

@@ -265,13 +265,16 @@ static void make(unsigned type, union proto_any *m)
 		make_text(m->error.text, 511);
 		break;
 	case PSR_MSG_OPEN:
-		m->open.resolution = below(PSR_WIRE_MAX_SIDE + 1);
+		m->open.resolution = (uint16_t)below(PSR_WIRE_MAX_SIDE + 1);
+		m->open.levels = (uint8_t)below(PSR_WIRE_MAX_LEVELS + 1);
 		m->open.name[0] = 'x';
 		make_text(m->open.name + 1, 254);
 		break;
 	case PSR_MSG_OPENED:
 		m->opened.handle = 1 + below(1000);
-		m->opened.representations = 2 * (1 + below(7));
+		m->opened.representations = (uint16_t)(2 * (1 + below(7)));
+		m->opened.of_levels = (uint8_t)below(PSR_WIRE_MAX_LEVELS + 1);
+		m->opened.octree_levels = (uint8_t)(m->opened.of_levels > 0 ? 1 + below(m->opened.of_levels) : 0);
 		m->opened.content_id[below(16)] = (uint8_t)below(256);
 		lengths(m->opened.box_min);
 		for (int i = 0; i < 3; i++)

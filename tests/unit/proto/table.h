@@ -116,10 +116,12 @@ static const struct proto_field fields_error[] = { AT(error, code, F_U16), AT(er
 static const struct proto_field fields_list_entry[] = { AT(list_entry, state, F_U8), AT(list_entry, file_bytes, F_U64),
 	ARRAY(list_entry, content_id, F_HEX, 16), AT(list_entry, name, F_TEXT), END };
 static const struct proto_field fields_list_end[] = { AT(list_end, n_entries, F_U32), END };
-static const struct proto_field fields_open[] = { AT(open, resolution, F_U32), AT(open, name, F_TEXT), END };
+static const struct proto_field fields_open[] = { AT(open, resolution, F_U16), AT(open, levels, F_U8),
+	AT(open, name, F_TEXT), END };
 static const struct proto_field fields_progress[] = { AT(progress, stage, F_U16), AT(progress, done, F_U64),
 	AT(progress, total, F_U64), END };
-static const struct proto_field fields_opened[] = { AT(opened, handle, F_U32), AT(opened, representations, F_U32),
+static const struct proto_field fields_opened[] = { AT(opened, handle, F_U32), AT(opened, representations, F_U16),
+	AT(opened, octree_levels, F_U8), AT(opened, of_levels, F_U8),
 	ARRAY(opened, content_id, F_HEX, 16), ARRAY(opened, box_min, F_F64, 3), ARRAY(opened, box_max, F_F64, 3),
 	ARRAY(opened, origin, F_F64, 3), AT(opened, scale, F_F64), AT(opened, spacing, F_F64),
 	AT(opened, resolution, F_U32), AT(opened, n_levels, F_U32), AT(opened, n_samples, F_U64),

@@ -324,18 +324,18 @@ static void a_source_has_a_model_a_resolution(void **state)
 	coarse = load_at("a", 512);
 	fine = load_at("a", 1024);
 	entry = catalogue_find(&catalogue, "a");
-	assert_ptr_equal(catalogue_model(entry, 512), coarse);
-	assert_ptr_equal(catalogue_model(entry, 1024), fine);
-	assert_null(catalogue_model(entry, 768));
+	assert_ptr_equal(catalogue_model(entry, 512, 0), coarse);
+	assert_ptr_equal(catalogue_model(entry, 1024, 0), fine);
+	assert_null(catalogue_model(entry, 768, 0));
 	scan(); /* nothing changed but, maybe, what lies beside it */
 	entry = catalogue_find(&catalogue, "a");
-	assert_ptr_equal(catalogue_model(entry, 512), coarse);
+	assert_ptr_equal(catalogue_model(entry, 512, 0), coarse);
 	assert_true(coarse->is_stale);
 	assert_true(fine->is_stale);
 	again = load_at("a", 512); /* it had changed */
-	assert_ptr_equal(catalogue_model(entry, 512), again);
+	assert_ptr_equal(catalogue_model(entry, 512, 0), again);
 	assert_null(coarse->entry);
-	assert_ptr_equal(catalogue_model(entry, 1024), fine);
+	assert_ptr_equal(catalogue_model(entry, 1024, 0), fine);
 	assert_int_equal(catalogue.n_models, 3);
 	catalogue_unref(&catalogue, coarse); /* gone with its last user */
 	assert_int_equal(catalogue.n_models, 2);
@@ -344,8 +344,8 @@ static void a_source_has_a_model_a_resolution(void **state)
 	catalogue_pin(&catalogue, again);
 	catalogue_unpin(&catalogue, again);
 	catalogue_unref(&catalogue, load("a")); /* the longest unused of an entry's models makes room */
-	assert_null(catalogue_model(entry, 1024));
-	assert_ptr_equal(catalogue_model(entry, 512), again);
+	assert_null(catalogue_model(entry, 1024, 0));
+	assert_ptr_equal(catalogue_model(entry, 512, 0), again);
 	catalogue_unref(&catalogue, again);
 }
 

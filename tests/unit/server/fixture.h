@@ -450,14 +450,17 @@ static inline void peer_hello(struct peer *p, const struct daemon *d, struct psr
 	                 PSR_OK);
 }
 
-static inline uint32_t peer_ask_open_for(struct peer *p, const char *name, uint32_t resolution)
+static inline uint32_t peer_ask_open_as(struct peer *p, const char *name, struct psr_msg_open open)
 {
-	struct psr_msg_open open = { .resolution = resolution };
-
 	snprintf(open.name, sizeof open.name, "%s", name);
 	assert_int_equal(psr_msg_open_encode(&p->buf, ++p->id, &open, NULL), PSR_OK);
 	peer_send(p);
 	return p->id;
+}
+
+static inline uint32_t peer_ask_open_for(struct peer *p, const char *name, uint32_t resolution)
+{
+	return peer_ask_open_as(p, name, (struct psr_msg_open){ .resolution = (uint16_t)resolution });
 }
 
 static inline uint32_t peer_ask_open(struct peer *p, const char *name)

@@ -106,7 +106,7 @@ static void a_model_that_left_keeps_its_name_and_comes_back(void **state)
 	catalogue_make_room(&catalogue, bytes);
 	expect_there("bcd");
 	assert_int_equal(model[0]->card.n_samples, PLATE_SAMPLES);
-	assert_ptr_equal(catalogue_model(catalogue_find(&catalogue, "a"), 0), model[0]);
+	assert_ptr_equal(catalogue_model(catalogue_find(&catalogue, "a"), 0, 0), model[0]);
 	assert_false(catalogue_is_loaded(catalogue_find(&catalogue, "a")));
 	scan();
 	assert_ptr_equal(catalogue_find(&catalogue, "a")->model, model[0]);

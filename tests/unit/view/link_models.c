@@ -6,9 +6,20 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "daemon.h"
+#include "tests/unit/server/cloud.h"
 
 static struct link_instance instance;
 static struct link_wish wish;
+
+/* Beginnings of 7 and 9 of its 11 levels. */
+static int set_up_cloud(void **state)
+{
+	set_up(state);
+	daemon_stop(&psrd);
+	cloud_write(folder, "cloud.psr", 11, 6000);
+	start_psrd(NULL);
+	return 0;
+}
 
 static void an_unknown_model_is_refused_and_another_wish_is_served(void **state)
 {
@@ -89,8 +100,8 @@ static void a_list_comes_beside_pictures(void **state)
 		wait_news(20);
 		list = link_list_take(link_, &n);
 	}
-	assert_int_equal(n, 2);
-	assert_string_equal(list[0].name, "plate");
+	assert_int_equal(n, 3);
+	assert_string_equal(list[1].name, "plate");
 	free(list);
 	link_close(link_);
 }
@@ -173,6 +184,41 @@ static void a_coarse_model_is_shown_until_the_fine_one_is_built(void **state)
 	folder_remove(bin);
 }
 
+/* Returns the levels that the picture's octree lacks. */
+static uint64_t missing_levels(const struct link_picture *picture)
+{
+	for (unsigned i = 0; i < picture->end.n_entries; i++)
+		if (picture->end.entry[i].id == PSR_WIRE_REPORT_LEVELS)
+			return (picture->end.entry[i].count >> 8) - (picture->end.entry[i].count & 0xff);
+	return 0;
+}
+
+static void a_packed_octree_is_shown_a_step_after_the_other(void **state)
+{
+	struct link_picture *picture;
+	unsigned seen = 0; /* bit k: pictures that lacked k levels */
+	int is_coarse = 1;
+
+	(void)state;
+	open_link(address);
+	wish_default(&wish, &instance, "cloud");
+	say_wish(&wish);
+	for (int64_t end = clock_ms() + PATIENCE_MS; is_coarse && clock_ms() < end;) {
+		wait_news(20);
+		picture = link_take(link_);
+		if (picture != NULL) {
+			assert_int_equal(seen & ((1u << missing_levels(picture)) - 1), 0); /* never coarser again */
+			seen |= 1u << missing_levels(picture);
+			is_coarse = picture->is_coarse;
+			assert_int_equal(is_coarse, missing_levels(picture) > 0);
+		}
+		link_release(picture);
+	}
+	assert_false(is_coarse);
+	assert_int_equal(seen, 1 << 4 | 1 << 2 | 1);
+	link_close(link_);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -180,7 +226,8 @@ int main(void)
 		cmocka_unit_test(a_model_is_added_while_another_one_turns),
 		cmocka_unit_test(a_list_comes_beside_pictures),
 		cmocka_unit_test(a_coarse_model_is_shown_until_the_fine_one_is_built),
+		cmocka_unit_test(a_packed_octree_is_shown_a_step_after_the_other),
 	};
 
-	return cmocka_run_group_tests(tests, set_up, tear_down);
+	return cmocka_run_group_tests(tests, set_up_cloud, tear_down);
 }
