@@ -9,7 +9,11 @@
  * know. */
 void effects_add(cJSON *to, const struct psr_msg_frame_end *end);
 
-/* Prints one effect a line. */
+/* Adds "drawn_as": by "blocks", "octree", "dpoints" the instances that are drawn as that, and why; of an octree
+ * the levels that the view needs. */
+void drawn_as_add(cJSON *to, const struct psr_msg_frame_end *end);
+
+/* Prints a line for each representation, and for each effect. */
 void effects_print(const struct psr_msg_frame_end *end);
 
 #endif

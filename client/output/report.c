@@ -141,6 +141,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	cJSON_AddNumberToObject(ms, "frame", (double)event->latency_ns / 1e6);
 	cJSON_AddNumberToObject(ms, "total", (double)(clock_ns() - facts->start_ns) / 1e6);
 	add_stages(report, event->end);
+	drawn_as_add(report, event->end);
 	effects_add(report, event->end);
 	add_planes(report, event);
 	if (event->end->planes >> PSR_PLANE_DEPTH & 1) {

@@ -278,6 +278,22 @@ static int make_room(struct bins *bins, const struct cull *cull)
 	           : PSR_ERR_MEMORY;
 }
 
+/* Cubes are numbered from the finest level on: the first that a chunk draws is its finest. */
+static void note_levels(const struct cull *cull, const struct cull_chunk *chunk, struct psr_report *report)
+{
+	const struct plan_instance *in = &cull->plan->instance[chunk->instance];
+	const struct psr_cubes *cubes = in->cull.cubes;
+	uint32_t levels;
+
+	if (cubes == NULL || chunk->n_hits == 0)
+		return;
+	levels = (uint32_t)psr_cubes_level(cubes, cull->bins->hit[chunk->first_hit].slot - in->first_slot)->tree->levels;
+	if (levels <= report->octree_levels)
+		return;
+	report->octree_levels = levels;
+	report->of_levels = (uint32_t)cubes->level[0].tree->levels;
+}
+
 /* Adds up the chunks in the report, and notes in the plan what shading needs. */
 static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report *report)
 {
@@ -293,6 +309,7 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		report->n_blocks_drawn += chunk->n_hits;
 		report->n_samples_drawn += chunk->n_samples;
 		report->levels |= chunk->levels;
+		note_levels(cull, chunk, report);
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
 		const int has_opacity = plan->instance[chunk->instance].cull.blocks->opacity != NULL;

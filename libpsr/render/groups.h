@@ -42,4 +42,12 @@ static inline const struct psr_blocks *instance_groups(const struct psr_instance
 	return instance->representation <= PSR_BLOCKS ? psr_model_blocks(instance->model) : NULL;
 }
 
+/* Returns what a valid instance is drawn as: never PSR_AUTOMATIC. */
+static inline enum psr_representation instance_drawn_as(const struct psr_instance *instance)
+{
+	if (instance_cubes(instance) != NULL)
+		return PSR_OCTREE;
+	return instance_points(instance) != NULL ? PSR_DPOINTS : PSR_BLOCKS;
+}
+
 #endif

@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/direction.h"
 #include "base/mem.h"
+#include "groups.h"
 #include "planes.h"
 #include "renderer.h"
 
@@ -65,6 +66,16 @@ static void note_time(struct psr_report *report, enum psr_stage stage, uint64_t 
 	*start = end;
 }
 
+static void note_representations(struct psr_report *report, const struct psr_scene *scene)
+{
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		const enum psr_representation as = instance_drawn_as(&scene->instance[i]);
+
+		report->drawn_as[as].n++;
+		report->drawn_as[as].n_automatic += scene->instance[i].representation == PSR_AUTOMATIC;
+	}
+}
+
 /* From the request to the z-buffer. Keeps the shadow maps of earlier frames as they are unless the frame is lit. */
 static int make_stack(struct psr_renderer *r, const struct call *call, int is_lit)
 {
@@ -84,6 +95,7 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 	if (rc)
 		return rc;
 	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
+	note_representations(report, call->scene);
 	note_time(report, PSR_STAGE_PLAN, &start);
 
 	const struct shadow_call shadow = {

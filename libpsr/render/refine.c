@@ -170,6 +170,11 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 	sum->n_filled += one->n_filled;
 	sum->levels |= one->levels;
 	sum->n_clamped += one->n_clamped;
+	memcpy(sum->drawn_as, one->drawn_as, sizeof sum->drawn_as);
+	if (one->octree_levels > sum->octree_levels) {
+		sum->octree_levels = one->octree_levels;
+		sum->of_levels = one->of_levels;
+	}
 	for (int e = 0; e < PSR_N_EFFECTS; e++) {
 		if (one->effect[e].why == PSR_WHY_RAN || sum->effect[e].why != PSR_WHY_RAN)
 			sum->effect[e].why = one->effect[e].why;

@@ -123,6 +123,12 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_rmse(end, PSR_WIRE_REPORT_RMSE_CHEAPER, &d->choice.cheaper);
 	add_rmse(end, PSR_WIRE_REPORT_RMSE_BETTER, &d->choice.better);
 	add_levels(end, d->scene);
+	for (unsigned as = PSR_BLOCKS; as <= PSR_DPOINTS; as++)
+		if (report->drawn_as[as].n > 0)
+			add_entry(end, PSR_WIRE_REPORT_AS_BLOCKS + as - PSR_BLOCKS, 0,
+			          report->drawn_as[as].n | (uint64_t)report->drawn_as[as].n_automatic << 32);
+	if (report->octree_levels > 0)
+		add_entry(end, PSR_WIRE_REPORT_FINEST, 0, report->octree_levels | report->of_levels << 8);
 	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }

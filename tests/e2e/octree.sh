@@ -145,6 +145,16 @@ check "psrd makes an octree of lines of numbers" shot --model lines --report "$w
 is "and of nothing else" "['octree']" "$(value "$work/lines.json" model.representations)"
 is "where nobody names one, blocks are drawn" "$(hashes --model both)" "$(hashes --instance both,as=blocks)"
 check "and an octree where it is named" [ "$(hashes --instance both,as=octree)" != "$(hashes --model both)" ]
+is "psr says why" "blocks     drawn: 1 instance, since the model has blocks, the fastest" \
+	"$(shot --model both --effects -o "$work/both.ppm" 2>/dev/null | head -n 1)"
+is "and of an octree how many levels suffice" \
+	"octree     drawn: 1 instance, since the scene says so; 5 of 7 levels suffice" \
+	"$(psr shot --server "$server" --size 24x24 --instance both,as=octree --effects --report "$work/named.json" \
+	-o "$work/named.ppm" 2>/dev/null | head -n 1)"
+is "which the report has, too" "5 7 0" "$(for of in levels of_levels automatic; do
+	value "$work/named.json" drawn_as.octree.$of; done | paste -sd " ")"
+check "a replay draws the octree again" psr shot --server "$server" --replay "$work/named.json" -o "$work/again.ppm"
+check "and not its blocks" cmp "$work/named.ppm" "$work/again.ppm"
 refuses "blocks of an octree" 4 "asks for representation 1 \\(blocks\\), and its model has an octree alone" \
 	shot --instance ball,as=blocks --hash
 check "the ball is round, red above and blue below" bash -c 'psr shot --server "$1" --model ball --view front \

@@ -71,6 +71,13 @@ struct psr_report {
 		uint64_t count;
 		enum psr_why why;
 	} effect[PSR_N_EFFECTS];
+	/* By enum psr_representation but PSR_AUTOMATIC: instances of the scene that are drawn as that, and how many of them
+	 * the scene left to the plan (psr/scene.h). */
+	struct {
+		uint32_t n, n_automatic;
+	} drawn_as[4];
+	/* Of the octree that is drawn down to most levels: these, and all that it has; 0: no octree is in view. */
+	uint32_t octree_levels, of_levels;
 	double error_px;           /* how far a drawn pixel's centre, at its depth, may be from the surface, in pixels. A bound,
 	                            * for models whose samples keep PSR_SAMPLE_OFF; proto/PROTOCOL.md has its parts */
 };

@@ -286,6 +286,11 @@ enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts
 	PSR_WIRE_REPORT_RMSE_BETTER = 44,
 	PSR_WIRE_REPORT_LEVELS = 45, /* drawn of the octree that lacks most: bits 0-7 its levels, 8-15 of its whole file;
 	                              * left out where no model is a beginning */
+	/* Instances of the scene that are drawn as blocks, as octrees and as differential points, and 2^32 times how many
+	 * of them the scene left to the server; left out if none are */
+	PSR_WIRE_REPORT_AS_BLOCKS = 46, PSR_WIRE_REPORT_AS_OCTREE = 47, PSR_WIRE_REPORT_AS_DPOINTS = 48,
+	PSR_WIRE_REPORT_FINEST = 49, /* of the octree drawn down to most levels: bits 0-7 these, 8-15 all that it has; left
+	                              * out if none is in view */
 	PSR_WIRE_REPORT_EFFECTS = 64, /* plus the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
 #define PSR_WIRE_RMSE_ONE 65536

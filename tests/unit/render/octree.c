@@ -358,6 +358,43 @@ static void an_instance_names_what_it_is_drawn_as(void **state)
 	psr_model_unref(model);
 }
 
+/* Seen at SIDE pixels across 2 units of a cube of 2, 2^levels leaves along it; a level is enough where its leaves are
+ * 1.07 pixels apart or less (decision 0106). */
+static void a_report_says_what_was_drawn_and_how_deep(void **state)
+{
+	struct psr_model *model = tree_build(&SOLID);
+	struct psr_instance instance[2] = { place(model), place(model) };
+	struct psr_scene scene = { .instance = instance, .n_instances = 2, .camera = orthographic(2) };
+	const uint32_t coarsest = (uint32_t)SOLID.levels - CUBES_MOST_LEVELS + 1;
+	uint32_t before = 0;
+
+	(void)state;
+	instance[1].representation = PSR_OCTREE;
+	instance[1].translation[0] = 100; /* out of sight */
+	for (double height = 2; height < 64; height *= 2) {
+		scene.camera = orthographic(height);
+		for (unsigned pass = 0; pass < 2; pass++) {
+			struct drawn *d = draw(&scene, 2, pass);
+			const struct psr_report *report = &d->frame.report;
+
+			assert_int_equal(report->drawn_as[PSR_OCTREE].n, 2);
+			assert_int_equal(report->drawn_as[PSR_OCTREE].n_automatic, 1);
+			assert_int_equal(report->drawn_as[PSR_BLOCKS].n + report->drawn_as[PSR_DPOINTS].n, 0);
+			assert_int_equal(report->of_levels, SOLID.levels);
+			if (pass == 0 && before > 0) /* half the size: a level less, down to the coarsest */
+				assert_int_equal(report->octree_levels, before - (before > coarsest));
+			before = pass == 0 ? report->octree_levels : before;
+			free(d);
+		}
+	}
+	assert_int_equal(before, coarsest);
+	scene.camera.target[0] = scene.camera.eye[0] += 50; /* nothing in view */
+	struct drawn *d = draw(&scene, 1, 0);
+	assert_int_equal(d->frame.report.octree_levels, 0);
+	free(d);
+	psr_model_unref(model);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -369,6 +406,7 @@ int main(void)
 		cmocka_unit_test(what_is_one_sided_is_not_seen_from_within),
 		cmocka_unit_test(planes_tell_of_leaves),
 		cmocka_unit_test(an_instance_names_what_it_is_drawn_as),
+		cmocka_unit_test(a_report_says_what_was_drawn_and_how_deep),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
