@@ -234,13 +234,14 @@ static int take_representation(const char *text, void *userdata, struct psr_erro
 	return PSR_OK;
 }
 
-/* Whoever names no representation gets what suits the file. One that cannot be read has its error when it is built. */
+/* Whoever names no representation gets what suits the file, and of its scan what there is. One that cannot be read has its error when it is built. */
 static void choose_representation(struct wish *wish, const char *in)
 {
 	if (wish->is_blocks || wish->is_octree || wish->is_points)
 		return;
 	wish->is_octree = octree_is_direct(in);
 	wish->is_blocks = !wish->is_octree;
+	wish->octree.with_scan &= wish->is_octree;
 }
 
 static int check_calibration(const struct wish *wish, struct psr_error *err)

@@ -5,7 +5,8 @@ static void layout_instance(struct wire *w, struct psr_msg_instance *m)
 {
 	wire_u32(w, &m->handle);
 	wire_u8(w, &m->representation);
-	wire_reserved(w, 3);
+	wire_u8(w, &m->color_by);
+	wire_reserved(w, 2);
 	wire_f64(w, m->rotation, 4);
 	wire_f64(w, m->translation, 3);
 	wire_f64(w, &m->scale, 1);
@@ -53,6 +54,7 @@ static int check_instance(const struct psr_msg_instance *m, struct psr_error *er
 
 	if (check_integer("an instance's model handle", m->handle, 1, UINT32_MAX, err) ||
 	    check_integer("an instance's representation", m->representation, 0, PSR_WIRE_REP_DPOINT, err) ||
+	    check_integer("an instance's colours", m->color_by, 0, PSR_WIRE_COLOR_RETURN, err) ||
 	    check_lengths("an instance's translation", m->translation, 3, err) ||
 	    check_positive("an instance's scale", m->scale, err))
 		return PSR_ERR_ARG;

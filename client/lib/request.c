@@ -49,6 +49,9 @@ int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scen
 		if ((client->welcome.capabilities & needs) != needs)
 			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no %s (%s)", client->address,
 			                kind == PSR_WIRE_REP_OCTREE ? "octrees" : "differential points", client->welcome.server);
+		if (scene->instance[i].color_by != PSR_WIRE_COLOR_OWN && !(client->welcome.capabilities & PSR_CAP_COLOR_BY))
+			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws models in their own colours alone (%s)", client->address,
+			                client->welcome.server);
 	}
 	if (code != PSR_OK)
 		return code;

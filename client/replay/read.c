@@ -142,6 +142,8 @@ int replay_wish(struct scene_wish *wish, const cJSON *report, struct psr_error *
 			to->levels = (uint32_t)get_number(&reader, model, "octree_levels", 1, PSR_WIRE_MAX_LEVELS);
 		if (cJSON_HasObjectItem(item, "as"))
 			to->place.representation = find_kind(&reader, item, "as", &instance_representations[1], 3);
+		if (cJSON_HasObjectItem(item, "color_by"))
+			to->place.color_by = find_kind(&reader, item, "color_by", &scene_colors[1], 4);
 		get_numbers(&reader, to->place.rotation, item, "rotation", 4);
 		get_numbers(&reader, to->place.translation, item, "translation", 3);
 		to->place.scale = get_number(&reader, item, "scale", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);

@@ -51,6 +51,8 @@ static void add_scene(cJSON *to, const struct scene *scene)
 		cJSON_AddNumberToObject(item, "model", scene->model_of[i]);
 		if (place->representation != PSR_WIRE_REP_AUTO)
 			cJSON_AddStringToObject(item, "as", instance_representations[place->representation]);
+		if (place->color_by != PSR_WIRE_COLOR_OWN)
+			cJSON_AddStringToObject(item, "color_by", scene_colors[place->color_by]);
 		json_add_numbers(item, "rotation", place->rotation, 4);
 		json_add_numbers(item, "translation", place->translation, 3);
 		json_add_number(item, "scale", place->scale);

@@ -8,6 +8,8 @@
 
 #define SCENE_AMBIENT 0.15
 
+extern const char *const scene_colors[5]; /* "intensity" and so on, by enum psr_wire_color; "" for OWN */
+
 struct scene_wish {
 	struct instance_wish *instance;
 	uint32_t n_instances;
@@ -19,6 +21,7 @@ struct scene_wish {
 	double ambient;
 	uint8_t background[3];
 	int is_shadowed, has_ambient;
+	const char *color_by;  /* of all instances, as scene_colors names it; NULL: their own colours */
 	const char *file;
 	char *file_text; /* holds the strings above */
 	int n_said;   /* how many of these options were given */

@@ -114,8 +114,16 @@ void scene_add_model_options(struct optlist *list, struct scene_wish *wish)
 		          "model, in no time. 0: all." },
 	};
 
+	const struct psr_opt colors[] = {
+		{ .name = "color-by", .type = PSR_OPT_STRING, .value = &wish->color_by, .arg = "WHAT", .seen = &wish->n_said,
+		  .words = "intensity class height return",
+		  .help = "Colours that tell a number of each point, instead of the models' own: height, of any "
+		          "model; intensity, class or return, of laser scans whose files tell them (LAS)." },
+	};
+
 	add_instances(list, wish);
 	OPTLIST_ADD(list, opts);
+	OPTLIST_ADD(list, colors);
 }
 
 void scene_add_light_options(struct optlist *list, struct scene_wish *wish)
@@ -150,10 +158,29 @@ static int read_file(struct scene_wish *wish, struct psr_error *err)
 	return wordfile_read(&words, &wish->file_text, err);
 }
 
+const char *const scene_colors[5] = { "", "intensity", "class", "height", "return" };
+
+static int apply_colors(struct scene_wish *wish, struct psr_error *err)
+{
+	uint8_t by = PSR_WIRE_COLOR_RETURN;
+
+	if (wish->color_by == NULL)
+		return PSR_OK;
+	while (by > PSR_WIRE_COLOR_OWN && strcmp(scene_colors[by], wish->color_by) != 0)
+		by--;
+	if (by == PSR_WIRE_COLOR_OWN)
+		return psr_fail(err, PSR_ERR_ARG, "--color-by is intensity, class, height or return, not '%.40s'", wish->color_by);
+	for (uint32_t i = 0; i < wish->n_instances; i++)
+		wish->instance[i].place.color_by = by;
+	return PSR_OK;
+}
+
 int scene_check(struct scene_wish *wish, struct psr_error *err)
 {
 	int code = wish->file != NULL ? read_file(wish, err) : PSR_OK;
 
+	if (code == PSR_OK)
+		code = apply_colors(wish, err);
 	if (code != PSR_OK)
 		return code;
 	if (wish->n_instances == 0)

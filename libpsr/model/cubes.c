@@ -65,6 +65,12 @@ static struct octree *make_tree(const struct cubes_making *m, int level)
 		is_done &= (tree->color = malloc(tree->n_leaves * sizeof *tree->color)) != NULL;
 	if (finest->normal != NULL && finest->offset != NULL)
 		is_done &= (tree->offset = malloc(tree->n_leaves)) != NULL;
+	if (finest->scan.intensity != NULL)
+		is_done &= (tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity)) != NULL;
+	if (finest->scan.class != NULL)
+		is_done &= (tree->scan.class = malloc(tree->n_leaves)) != NULL;
+	if (finest->scan.returns != NULL)
+		is_done &= (tree->scan.returns = malloc(tree->n_leaves)) != NULL;
 	if (is_done)
 		return tree;
 	octree_destroy(tree);
@@ -73,7 +79,9 @@ static struct octree *make_tree(const struct cubes_making *m, int level)
 
 static uint64_t bytes_of(const struct octree *tree)
 {
-	const uint64_t leaf = (tree->normal != NULL ? 2 : 0) + (tree->color != NULL ? 3 : 0) + (tree->offset != NULL);
+	const struct octree_scan *scan = &tree->scan;
+	const uint64_t leaf = (tree->normal != NULL ? 2 : 0) + (tree->color != NULL ? 3 : 0) + (tree->offset != NULL)
+	                      + (scan->intensity != NULL ? 2 : 0) + (scan->class != NULL) + (scan->returns != NULL);
 
 	return sizeof *tree + tree->n_codes + tree->n_skips * sizeof *tree->skip + tree->n_leaves * leaf;
 }
@@ -200,6 +208,9 @@ int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct p
 		psr_pool_for(pool, OCTREE_TASKS, cubes_fill_task, m);
 		psr_pool_for(pool, OCTREE_TASKS, relate, m);
 		psr_pool_for(pool, OCTREE_TASKS, cubes_bound_task, m);
+		rc = cubes_survey_scan(&cubes->scan, tree, err);
+	}
+	if (rc == PSR_OK) {
 		*out = cubes;
 	} else {
 		psr_cubes_destroy(cubes);

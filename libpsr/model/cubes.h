@@ -5,6 +5,7 @@
 #include <string.h>
 #include "model/blocks.h"
 #include "octree/octree.h"
+#include "psr/tint.h"
 
 #define CUBES_MOST_LEVELS 5 /* those of a cluster: one cube of the coarsest covers 64x64x64 leaves */
 #define CUBES_RUN 64        /* cubes that store their codes' and leaves' places relative to those of the first one */
@@ -57,6 +58,7 @@ struct psr_cubes {
 	struct psr_blocks groups;
 	struct psr_cube_level level[CUBES_MOST_LEVELS];
 	const struct psr_cube *cube;
+	struct psr_scan scan;
 	uint64_t n_bytes;
 };
 

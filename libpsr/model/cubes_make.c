@@ -110,6 +110,23 @@ static void put_node(struct subtree *s, int height, uint64_t place)
 	s->code += n;
 }
 
+/* As leaves have them of their points: the mean of intensities, class and return of the first child. */
+static void average_scan(const struct octree_scan *to, uint64_t leaf, const struct octree_scan *from, uint64_t first,
+                         unsigned n)
+{
+	if (to->intensity != NULL) {
+		unsigned sum = n / 2;
+
+		for (unsigned i = 0; i < n; i++)
+			sum += from->intensity[first + i];
+		to->intensity[leaf] = (uint16_t)(sum / n);
+	}
+	if (to->class != NULL)
+		to->class[leaf] = from->class[first];
+	if (to->returns != NULL)
+		to->returns[leaf] = from->returns[first];
+}
+
 /* Gives the leaves of a level's tree, from `leaf` on, the means of those of the finer one from `finer_leaf` on. */
 static void average(const struct subtree *s, int level, uint64_t leaf, uint64_t finer_leaf)
 {
@@ -125,6 +142,7 @@ static void average(const struct subtree *s, int level, uint64_t leaf, uint64_t 
 		if (tree->offset != NULL)
 			tree->offset[leaf] = (uint8_t)octree_mean_offset(code, tree->normal[leaf], finer->normal + finer_leaf,
 			                                                 finer->offset + finer_leaf);
+		average_scan(&tree->scan, leaf, &finer->scan, finer_leaf, n);
 		finer_leaf += n;
 	}
 }

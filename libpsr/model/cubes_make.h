@@ -32,6 +32,9 @@ void cubes_fill_task(int task, void *userdata);
 /* Bounds the runs of a task. After all tasks have filled. */
 void cubes_bound_task(int task, void *userdata);
 
+/* Finds which streams of a scan a tree has, and their ranges. MEMORY. */
+int cubes_survey_scan(struct psr_scan *scan, const struct octree *tree, struct psr_error *err);
+
 static inline uint32_t cubes_n_runs(const struct psr_cube_level *level)
 {
 	return (level->n + CUBES_RUN - 1) / CUBES_RUN;

@@ -3,18 +3,21 @@
 #include "pack.h"
 
 /* Which sections of the table have the attributes of leaves: 2 bytes of normals, and so on. */
-static unsigned leaf_bytes(const uint8_t *table, uint64_t n_sections)
+static unsigned leaf_bytes(const uint8_t *table, uint64_t n_sections, int *has_normal)
 {
 	static const struct {
 		char type[5];
 		unsigned bytes;
-	} of[] = { { "ONRM", 2 }, { "OOFF", 1 }, { "OCOL", 3 } };
+	} of[] = { { "ONRM", 2 }, { "OOFF", 1 }, { "OCOL", 3 }, { "OINT", 2 }, { "OCLS", 1 }, { "ORET", 1 } };
 	unsigned bytes = 0;
 
+	*has_normal = 0;
 	for (uint64_t i = 0; i < n_sections; i++)
 		for (size_t k = 0; k < sizeof of / sizeof *of; k++)
-			if (memcmp(table + FILE_ENTRY_BYTES * i + ENTRY_TYPE, of[k].type, 4) == 0)
+			if (memcmp(table + FILE_ENTRY_BYTES * i + ENTRY_TYPE, of[k].type, 4) == 0) {
 				bytes += of[k].bytes;
+				*has_normal |= k == 0;
+			}
 	return bytes;
 }
 
@@ -40,6 +43,7 @@ uint64_t model_cubes_need(const struct pack_source *source, int is_packed)
 	struct octree tree = { .levels = 0 };
 	uint64_t n_sections;
 	unsigned leaf;
+	int has_normal;
 
 	if (got < FILE_HEADER_BYTES)
 		return 0;
@@ -51,7 +55,7 @@ uint64_t model_cubes_need(const struct pack_source *source, int is_packed)
 	file_get_octree(&tree, octree);
 	if (model_check_octree_counts(&tree, source->name, NULL) != PSR_OK)
 		return 0;
-	leaf = leaf_bytes(table, n_sections);
-	tree.normal = leaf & 2 ? &normal : NULL;
+	leaf = leaf_bytes(table, n_sections, &has_normal);
+	tree.normal = has_normal ? &normal : NULL;
 	return psr_cubes_guess(&tree, leaf);
 }

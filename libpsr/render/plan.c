@@ -8,6 +8,7 @@
 #include "groups.h"
 #include "plan.h"
 #include "plan_warp.h"
+#include "tint.h"
 
 /* The near distance, as a part of the scene's extent, if the request sets none. */
 #define AUTO_NEAR (1.0 / 16384)
@@ -313,6 +314,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 		if (plan->light[plan->n_lights++].kind != PSR_LIGHT_DIRECTIONAL)
 			plan->view.needs |= STRIP_POSITION;
 	}
+	plan_tints(plan, scene);
 	if (plan->is_full)
 		plan->view.needs = STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR | STRIP_BENT;
 	return PSR_OK;

@@ -8,7 +8,16 @@
  * and 4. Each class has a map, in which its blocks are solid. */
 enum { NO_CASTER = -1, SHADOW_OPAQUE, SHADOW_CASTERS = 5 };
 
+/* Of an instance that is not drawn in its own colours. */
+struct plan_tint {
+	enum psr_color_by by;
+	uint16_t low;
+	float scale;   /* INTENSITY: (intensity - low) * scale is 0..1 */
+	float axis[4]; /* HEIGHT: axis . (x, y, z, 1), in camera space, is 0 at the bottom and 1 at the top */
+};
+
 struct plan_instance {
+	struct plan_tint tint;
 	uint32_t first_slot;  /* slot of block b is first_slot + b */
 	uint32_t first_group; /* number of the model's group 0; each model has n_clusters numbers */
 	struct cull_view cull;
@@ -44,6 +53,7 @@ struct plan {
 	struct strip_view view;            /* the cull completes `needs` */
 	int has_sheer;                     /* a block in view has opacities; set by the cull, as is the next */
 	int has_thin;                      /* a sheer block in view is of thin things */
+	int has_tint;                      /* an instance is not drawn in its own colours */
 	int has_octrees, has_points;       /* an instance is drawn as one, or as differential points */
 	int caster;                        /* of a shadow map, SHADOW_OPAQUE or a class of glass; of a picture NO_CASTER */
 	struct strip_light *light;

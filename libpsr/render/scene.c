@@ -7,6 +7,48 @@
 
 #define MAX_LENGTH 1e30
 
+static int check_tint(const struct psr_instance *instance, unsigned i, struct psr_error *err)
+{
+	static const char *const names[] = { "", "intensities", "classes", "", "returns" };
+	static const struct psr_scan none;
+	const struct psr_cubes *cubes = instance_cubes(instance);
+	const struct psr_scan *scan = cubes != NULL ? &cubes->scan : &none;
+	const enum psr_color_by by = instance->color_by;
+
+	if ((unsigned)by > PSR_COLOR_RETURN)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: there are no colours %d", i, by);
+	if (by == PSR_COLOR_OWN || by == PSR_COLOR_HEIGHT || (by == PSR_COLOR_INTENSITY && scan->has_intensity)
+	    || (by == PSR_COLOR_CLASS && scan->has_class) || (by == PSR_COLOR_RETURN && scan->has_return))
+		return PSR_OK;
+	return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: its %s no %s of a scan; an octree has them that psr-model build "
+	                "--scan made of a LAS file that tells them. Any model can be coloured by height", i,
+	                cubes != NULL ? "octree keeps" : "representation has", names[by]);
+}
+
+void psr_scene_scan(struct psr_scan *scan, const struct psr_scene *scene)
+{
+	*scan = (struct psr_scan){ .low = UINT16_MAX };
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		const enum psr_color_by by = scene->instance[i].color_by;
+		const struct psr_cubes *cubes = instance_cubes(&scene->instance[i]);
+
+		if (by == PSR_COLOR_INTENSITY) {
+			scan->has_intensity = 1;
+			scan->low = cubes->scan.low < scan->low ? cubes->scan.low : scan->low;
+			scan->high = cubes->scan.high > scan->high ? cubes->scan.high : scan->high;
+		} else if (by == PSR_COLOR_CLASS) {
+			scan->has_class = 1;
+			for (int k = 0; k < 4; k++)
+				scan->classes[k] |= cubes->scan.classes[k];
+		} else if (by == PSR_COLOR_RETURN) {
+			scan->has_return = 1;
+			scan->orders |= cubes->scan.orders;
+		}
+	}
+	if (!scan->has_intensity)
+		scan->low = 0;
+}
+
 static int validate_instance(const struct psr_instance *instance, unsigned i, struct psr_error *err)
 {
 	static const char *const names[] = { "samples", "blocks", "octree", "differential points" };
@@ -23,6 +65,8 @@ static int validate_instance(const struct psr_instance *instance, unsigned i, st
 	}
 	if (instance_groups(instance) == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no %s", i, names[instance->representation]);
+	if (check_tint(instance, i, err) != PSR_OK)
+		return PSR_ERR_UNSUPPORTED;
 	double q = 0;
 	for (int k = 0; k < 4; k++)
 		q += instance->rotation[k] * instance->rotation[k];

@@ -1,6 +1,7 @@
 #include "base/direction.h"
 #include "base/clock.h"
 #include "shade.h"
+#include "tint.h"
 
 #define TIMED_EVERY 16 /* strips: reading the clock costs time, too */
 
@@ -136,6 +137,8 @@ uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint
 	simd->strip_find(pixels, &plan->view);
 	simd->strip_read(strip, &plan->view);
 	simd->strip_resolve(strip, &plan->view, plan->ambient);
+	if (plan->has_tint)
+		tint_strip(strip, plan);
 	light_strip(strip, &shading);
 	return pixels->n;
 }
@@ -166,6 +169,8 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 		if (strip.pixels->n) {
 			simd->strip_read(&strip, &plan->view);
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
+			if (plan->has_tint)
+				tint_strip(&strip, plan);
 		}
 		const uint64_t middle = is_timed ? clock_ns() : 0;
 		if (strip.pixels->n) {

@@ -83,6 +83,21 @@ static void add_levels(struct psr_msg_frame_end *end, const struct scene *scene)
 		add_entry(end, PSR_WIRE_REPORT_LEVELS, 0, most.levels | most.of_levels << 8);
 }
 
+/* Says which colours stand for which numbers. */
+static void add_scan(struct psr_msg_frame_end *end, const struct psr_scene *scene)
+{
+	struct psr_scan scan;
+
+	psr_scene_scan(&scan, scene);
+	if (scan.has_intensity)
+		add_entry(end, PSR_WIRE_REPORT_INTENSITIES, 0, scan.low | (uint64_t)scan.high << 16);
+	for (unsigned k = 0; k < 4; k++)
+		if (scan.classes[k] != 0)
+			add_entry(end, (uint16_t)(PSR_WIRE_REPORT_CLASSES + k), 0, scan.classes[k]);
+	if (scan.has_return)
+		add_entry(end, PSR_WIRE_REPORT_RETURNS, 0, scan.orders);
+}
+
 struct times { /* clock_ns() */
 	uint64_t start_ns, drawn_ns, end_ns;
 };
@@ -129,6 +144,7 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 			          report->drawn_as[as].n | (uint64_t)report->drawn_as[as].n_automatic << 32);
 	if (report->octree_levels > 0)
 		add_entry(end, PSR_WIRE_REPORT_FINEST, 0, report->octree_levels | report->of_levels << 8);
+	add_scan(end, &d->scene->scene);
 	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }

@@ -141,6 +141,11 @@ static int add_instance(struct scene *scene, const struct handles *handles, cons
 		[PSR_WIRE_REP_AUTO] = PSR_AUTOMATIC, [PSR_WIRE_REP_BLOCKS] = PSR_BLOCKS, [PSR_WIRE_REP_OCTREE] = PSR_OCTREE,
 		[PSR_WIRE_REP_DPOINT] = PSR_DPOINTS,
 	};
+	static const enum psr_color_by colors[] = {
+		[PSR_WIRE_COLOR_OWN] = PSR_COLOR_OWN, [PSR_WIRE_COLOR_INTENSITY] = PSR_COLOR_INTENSITY,
+		[PSR_WIRE_COLOR_CLASS] = PSR_COLOR_CLASS, [PSR_WIRE_COLOR_HEIGHT] = PSR_COLOR_HEIGHT,
+		[PSR_WIRE_COLOR_RETURN] = PSR_COLOR_RETURN,
+	};
 	double norm = 0;
 
 	if (model == NULL)
@@ -152,6 +157,7 @@ static int add_instance(struct scene *scene, const struct handles *handles, cons
 		                msg->representation, names[msg->representation], lowest_name(names, model->card.representations),
 		                is_one(model->card.representations) ? " alone" : " and others");
 	instance->representation = representations[msg->representation];
+	instance->color_by = colors[msg->color_by];
 	for (int k = 0; k < 4; k++)
 		norm += msg->rotation[k] * msg->rotation[k];
 	norm = sqrt(norm);

@@ -162,7 +162,7 @@ static int run(struct build *build, struct psr_error *err)
 	char threads[16], resolution[16];
 	const char *argv[] = {
 		build->job.program, "build", build->job.source, "-o", build->job.target, "-r", resolution, "--progress-fd", "3",
-		"--quiet", "--threads", threads, NULL,
+		"--quiet", "--threads", threads, "--scan", NULL,
 	};
 	const struct spawn_limits limits = {
 		.memory_bytes = builder->limits.memory_bytes, .cpu_seconds = builder->limits.cpu_seconds,

@@ -9,6 +9,7 @@
 #include <stdint.h>
 #include "error.h"
 #include "model.h"
+#include "tint.h"
 #include "view.h"
 
 #ifdef __cplusplus
@@ -30,6 +31,9 @@ struct psr_instance {
 	double translation[3];
 	double scale;        /* > 0 */
 	enum psr_representation representation;
+	/* Other than OWN: light does not change the colours, they only darken towards the rims of surfaces. INTENSITY,
+	 * CLASS and RETURN are of octrees that keep this stream of their scan. */
+	enum psr_color_by color_by;
 };
 
 struct psr_scene {
@@ -44,6 +48,10 @@ struct psr_scene {
 
 /* Checks all ranges above: PSR_ERR_ARG or LIMIT with a sentence that names the field. */
 int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err);
+
+/* Tells what the instances that are coloured by a stream of their scan have of it together, as a legend shows it: one
+ * range of intensities for all. The scene must be valid. */
+void psr_scene_scan(struct psr_scan *scan, const struct psr_scene *scene);
 
 /* Sets a camera that shows the whole box from a little to the right and above of the front, with a vertical angle of
  * fov_y radians (0: orthographic) and an aspect of width / height. `up` has any length but 0; camera->up gets it with

@@ -54,6 +54,7 @@ enum psr_cap {
 	PSR_CAP_RMSE_BOUND = 1 << 23,
 	PSR_CAP_BOUND = 1 << 24,       /* the plane of bounds */
 	PSR_CAP_LEVELS = 1 << 25,      /* OPEN of the first levels of a packed octree */
+	PSR_CAP_COLOR_BY = 1 << 26,    /* instances in other colours than their own */
 };
 
 /* ---- the session ---- */
@@ -98,6 +99,10 @@ struct psr_msg_progress { /* any number of these before OPENED; stages never go 
 	uint64_t done, total; /* in units of the stage; total 0: unknown, and done only rises; else done <= total */
 };
 
+enum psr_wire_color {
+	PSR_WIRE_COLOR_OWN = 0, PSR_WIRE_COLOR_INTENSITY = 1, PSR_WIRE_COLOR_CLASS = 2, PSR_WIRE_COLOR_HEIGHT = 3,
+	PSR_WIRE_COLOR_RETURN = 4,
+};
 enum psr_wire_rep { PSR_WIRE_REP_AUTO = 0, PSR_WIRE_REP_BLOCKS = 1, PSR_WIRE_REP_OCTREE = 2, PSR_WIRE_REP_DPOINT = 3 };
 struct psr_msg_opened {
 	uint32_t handle;          /* not 0; of this connection */
@@ -136,6 +141,7 @@ struct psr_msg_fetch_end { /* server -> client, when all has been sent */
 struct psr_msg_instance { /* world = translation + scale * rotate(rotation, object) */
 	uint32_t handle;
 	uint8_t representation;   /* enum psr_wire_rep */
+	uint8_t color_by;         /* enum psr_wire_color */
 	double rotation[4];       /* x, y, z, w; | |q|^2 - 1 | <= 1e-6; receivers normalise it */
 	double translation[3];
 	double scale;             /* 1e-30..1e30 */
@@ -291,6 +297,10 @@ enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts
 	PSR_WIRE_REPORT_AS_BLOCKS = 46, PSR_WIRE_REPORT_AS_OCTREE = 47, PSR_WIRE_REPORT_AS_DPOINTS = 48,
 	PSR_WIRE_REPORT_FINEST = 49, /* of the octree drawn down to most levels: bits 0-7 these, 8-15 all that it has; left
 	                              * out if none is in view */
+	/* Of all instances that are coloured so; left out where none is. */
+	PSR_WIRE_REPORT_INTENSITIES = 52, /* bits 0-15 and 16-31: those at the ends of the ramp */
+	PSR_WIRE_REPORT_CLASSES = 53,     /* 53 to 56: bit c is class c, of 64 each; words of 0 are left out */
+	PSR_WIRE_REPORT_RETURNS = 57,     /* bits: a point is 0 the only return, 1 the first, 2 one between, 3 the last */
 	PSR_WIRE_REPORT_EFFECTS = 64, /* plus the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
 #define PSR_WIRE_RMSE_ONE 65536

@@ -14,6 +14,7 @@ struct tree_options {
 	double radius;    /* of a sphere about the origin; the cube is -1..1 in each direction */
 	int is_one_sided;
 	int with_offsets;
+	int with_scan;    /* intensity 30,000 (y + 1); class 2 where x > 0, else 6; return 1 of 1 where z > 0, else 2 of 2 */
 	double keep;      /* of the leaves: 1 keeps all, less makes a cloud */
 };
 
@@ -74,6 +75,11 @@ static inline int tree_fill(const struct octree_node *node, void *userdata)
 	tree->offset[node->leaf] = (uint8_t)octree_offset_step((filling->options->radius - r) / h);
 	for (int a = 0; a < 3; a++)
 		tree->color[node->leaf][a] = c[a] > 0 ? 200 : 60;
+	if (!filling->options->with_scan)
+		return 0;
+	tree->scan.intensity[node->leaf] = (uint16_t)(30000 * (c[1] + 1));
+	tree->scan.class[node->leaf] = c[0] > 0 ? 2 : 6;
+	tree->scan.returns[node->leaf] = c[2] > 0 ? 0x11 : 0x22;
 	return 0;
 }
 
@@ -101,6 +107,11 @@ static inline struct psr_model *tree_build(const struct tree_options *options)
 	tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
 	tree->color = malloc(tree->n_leaves * sizeof *tree->color);
 	tree->offset = malloc(tree->n_leaves);
+	if (options->with_scan) {
+		tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity);
+		tree->scan.class = malloc(tree->n_leaves);
+		tree->scan.returns = malloc(tree->n_leaves);
+	}
 	octree_walk(tree, options->levels, tree_fill, &(struct tree_filling){ options, tree });
 	if (!options->with_offsets) {
 		free(tree->offset);

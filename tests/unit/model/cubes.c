@@ -41,7 +41,14 @@ static struct octree *make_tree(size_t form)
 	tree->offset = malloc(tree->n_leaves);
 	tree->color = malloc(tree->n_leaves * sizeof *tree->color);
 	assert_true(tree->normal != NULL && tree->offset != NULL && tree->color != NULL);
+	tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity);
+	tree->scan.class = malloc(tree->n_leaves);
+	tree->scan.returns = malloc(tree->n_leaves);
+	assert_true(tree->scan.intensity != NULL && tree->scan.class != NULL && tree->scan.returns != NULL);
 	for (uint64_t i = 0; i < tree->n_leaves; i++) {
+		tree->scan.intensity[i] = (uint16_t)random_below(&random, 65536);
+		tree->scan.class[i] = (uint8_t)random_below(&random, 256);
+		tree->scan.returns[i] = (uint8_t)random_below(&random, 256);
 		/* Runs of equal normals, and some at random. */
 		tree->normal[i] = (uint16_t)(random_below(&random, 4) == 0 || i == 0 ? random_below(&random, PSR_DIRECTIONS)
 		                                                                     : tree->normal[i - 1]);
@@ -81,6 +88,13 @@ static int has_means(const struct octree_node *node, void *userdata)
 	assert_int_equal(c->tree->normal[c->n], normal);
 	octree_mean_color(color, (const uint8_t(*)[3])c->finer->color + node->leaf, n);
 	assert_memory_equal(c->tree->color[c->n], color, 3);
+	const struct octree_scan *scan = &c->finer->scan;
+	unsigned intensity = n / 2;
+	for (unsigned i = 0; i < n; i++)
+		intensity += scan->intensity[node->leaf + i];
+	assert_int_equal(c->tree->scan.intensity[c->n], intensity / n);
+	assert_int_equal(c->tree->scan.class[c->n], scan->class[node->leaf]);
+	assert_int_equal(c->tree->scan.returns[c->n], scan->returns[node->leaf]);
 	for (unsigned j = 0, i = 0; j < 8; j++) {
 		if (!(code >> j & 1))
 			continue;
@@ -288,9 +302,49 @@ static void counts_tell_the_memory_of_cubes(void **state)
 		uint64_t guess;
 
 		assert_int_equal(psr_cubes_create(&cubes, tree, NULL, NULL), PSR_OK);
-		guess = psr_cubes_guess(tree, tree->normal != NULL ? 6 : 0);
+		guess = psr_cubes_guess(tree, tree->normal != NULL ? 10 : 0);
 		if (tree->n_leaves > 1000)
 			assert_true(guess > cubes->n_bytes * 7 / 8 && guess < cubes->n_bytes * 9 / 8);
+		psr_cubes_destroy(cubes);
+		octree_destroy(tree);
+	}
+}
+
+/* Returns how many leaves have less. */
+static uint64_t n_below(const struct octree *tree, unsigned intensity)
+{
+	uint64_t n = 0;
+
+	for (uint64_t i = 0; i < tree->n_leaves; i++)
+		n += tree->scan.intensity[i] < intensity;
+	return n;
+}
+
+/* The range leaves out a fiftieth at either end; classes and orders are those that some leaf has. */
+static void the_scan_of_a_tree_is_surveyed(void **state)
+{
+	(void)state;
+	for (size_t form = 0; form < N_FORMS; form++) {
+		struct octree *tree = make_tree(form);
+		struct psr_cubes *cubes;
+		uint64_t classes[4] = { 0 };
+		unsigned orders = 0;
+
+		assert_int_equal(psr_cubes_create(&cubes, tree, NULL, NULL), PSR_OK);
+		const struct psr_scan *scan = &cubes->scan;
+		assert_int_equal(scan->has_intensity, forms[form].has_attributes);
+		if (forms[form].has_attributes) {
+			const uint64_t n = tree->n_leaves, outside = n / 50;
+
+			assert_true(n_below(tree, scan->low) <= outside && n_below(tree, scan->low + 1u) > outside);
+			assert_true(n - n_below(tree, scan->high + 1u) <= outside && n - n_below(tree, scan->high) > outside);
+			for (uint64_t i = 0; i < tree->n_leaves; i++) {
+				classes[tree->scan.class[i] / 64] |= UINT64_C(1) << tree->scan.class[i] % 64;
+				orders |= 1u << psr_return_order(tree->scan.returns[i]);
+			}
+		}
+		assert_memory_equal(scan->classes, classes, sizeof classes);
+		assert_int_equal(scan->orders, orders);
 		psr_cubes_destroy(cubes);
 		octree_destroy(tree);
 	}
@@ -302,6 +356,7 @@ int main(void)
 		cmocka_unit_test(cubes_and_their_trees_are_what_they_should_be),
 		cmocka_unit_test(threads_make_the_same_cubes),
 		cmocka_unit_test(counts_tell_the_memory_of_cubes),
+		cmocka_unit_test(the_scan_of_a_tree_is_surveyed),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

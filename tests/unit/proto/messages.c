@@ -77,6 +77,7 @@ static void make_scene(struct psr_msg_scene *m)
 
 		n->handle = 1 + below(1u << 31);
 		n->representation = (uint8_t)below(4);
+		n->color_by = (uint8_t)below(5);
 		for (int k = 0; k < 4; k++) {
 			n->rotation[k] = unit() - 0.5 + 1e-3;
 			norm += n->rotation[k] * n->rotation[k];

@@ -128,6 +128,7 @@ static const struct proto_field fields_opened[] = { AT(opened, handle, F_U32), A
 	AT(opened, n_blocks, F_U64), AT(opened, bytes, F_U64), ARRAY(opened, up, F_F64, 3), END };
 static const struct proto_field fields_close[] = { AT(close, handle, F_U32), END };
 static const struct proto_field fields_instance[] = { AT(instance, handle, F_U32), AT(instance, representation, F_U8),
+	AT(instance, color_by, F_U8),
 	ARRAY(instance, rotation, F_F64, 4), ARRAY(instance, translation, F_F64, 3), AT(instance, scale, F_F64), END };
 static const struct proto_field fields_light[] = { AT(light, kind, F_U8), AT(light, flags, F_U8),
 	ARRAY(light, color, F_U8, 3), AT(light, intensity, F_F64), ARRAY(light, position, F_F64, 3),

@@ -13,7 +13,7 @@ static struct peer p, q;
 
 static const char script[] =
 	"#!/bin/sh\n"
-	"# psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N\n"
+	"# psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N --scan\n"
 	"here=${0%/*}\n"
 	"echo \"$1 $3 $5 $6 $7 $8 $9 ${10} ${11} $(nice) $(ulimit -v) $(ulimit -t)\" >> $here/log\n"
 	"echo 'import 1 1' >&3\n"

@@ -14,7 +14,7 @@ static struct peer p, q;
 
 static const char script[] =
 	"#!/bin/sh\n"
-	"# psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N\n"
+	"# psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N --scan\n"
 	"here=${0%/*}\n"
 	"echo $$ >> $here/log\n"
 	"case $(cat \"$2\") in\n"
