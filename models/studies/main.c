@@ -88,6 +88,9 @@ static const struct study_kind tables[] = {
 	  "bad: corners without a curvature, and pieces without a normal. No place is left uncovered.", NULL },
 	{ "octree", "[B] table 1", "octrees, beside blocks of the same models", table_octree, "teapot,kittyhawk,pinetree",
 	  NOTE_OCTREE, NULL },
+	{ "octree-prefixes", "[B] figure 13", "parts of packed octrees of 11 levels", table_octree_prefixes, "teapot,kittyhawk",
+	  "MB: of the file, that have come; levels, M pts: of the model that they are; below: decibels that it lacks of the\n"
+	  "whole; wrong: holes and leaks, of a million pixels inside.", NULL },
 };
 static const struct study_kind figures[] = {
 	{ .name = "gaps", "figure 4.9", "methods of finding gaps", figure_gaps },

@@ -1,0 +1,34 @@
+/* What studies of octrees share (octree_views.c): three views of a model, their truth, and what frames of models of it
+ * cost and miss. */
+#ifndef MODELS_STUDIES_TABLES_OCTREE_H
+#define MODELS_STUDIES_TABLES_OCTREE_H
+
+#include "measure/measure.h"
+#include "octree/octree.h"
+#include "tables.h"
+
+#define OCTREE_SIDE 512 /* of a picture, as in [B] 6 */
+#define OCTREE_VIEWS 3
+
+struct octree_truth {
+	struct psr_source_planes view[OCTREE_VIEWS];
+	struct psr_frame frame; /* room for one */
+};
+
+/* Traces the views. octree_truth_fini() is due even on failure. MEMORY, and errors of the source. */
+int octree_truth_init(struct octree_truth *truth, struct study *study, const struct study_model *of);
+void octree_truth_fini(struct octree_truth *truth);
+
+struct octree_drawn {
+	double fps, db, wrong; /* frames a second; decibels over covered pixels; holes and leaks, of a million inside */
+};
+
+/* Draws all views of two models in turn. Needs study->renderer. */
+int octree_compare(struct octree_drawn drawn[2], struct study *study, const struct study_model *of,
+                   const struct psr_model *const model[2], const struct octree_truth *truth);
+
+/* Makes the octree of a mesh, and the model of it. The caller owns *tree, which is NULL or whole, and *out. */
+int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,
+                  int levels);
+
+#endif

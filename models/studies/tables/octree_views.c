@@ -1,0 +1,198 @@
+/* Views of a model as studies of octrees take them, the truth of these, and what frames cost and miss. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/clock.h"
+#include "base/vec.h"
+#include "model/tree.h"
+#include "octree.h"
+#include "render/render.h"
+#include "render/stages.h"
+#include "sample/octree/of_mesh.h"
+
+#define RAYS 4      /* along the side of a pixel */
+#define TRIALS 9    /* frames of each view and model, in turn; the median counts */
+#define DISTANCE 4  /* of the eye, in radii */
+#define MARGIN 1.05
+
+static const double directions[OCTREE_VIEWS][3] = { { 0.5, 0.4, 1 }, { -0.9, 0.7, 0.6 }, { 0.3, -0.35, -1 } };
+
+struct stage {
+	struct psr_scene scene;
+	struct psr_instance instance;
+	struct psr_light light;
+};
+
+static void set_stage(struct stage *stage, const struct study_model *of, const double toward[3])
+{
+	const double away = DISTANCE * of->scale;
+	struct psr_camera *camera = &stage->scene.camera;
+	double unit[3], forward[3], right[3];
+
+	memset(stage, 0, sizeof *stage);
+	v3d_normalize(unit, toward);
+	v3d_scale(forward, unit, -1);
+	v3d_normalize(camera->up, of->mesh->up);
+	v3d_cross(right, forward, camera->up);
+	v3d_normalize(right, right);
+	memcpy(camera->target, of->origin, sizeof camera->target);
+	v3d_add_scaled(camera->eye, camera->target, away, unit);
+	camera->kind = PSR_CAMERA_PERSPECTIVE;
+	camera->fov_y = 2 * asin(MARGIN / DISTANCE);
+	stage->instance = (struct psr_instance){ .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	stage->light.kind = PSR_LIGHT_DIRECTIONAL;
+	v3d_add_scaled(stage->light.direction, forward, 0.6, right);
+	v3d_add_scaled(stage->light.direction, stage->light.direction, -0.5, camera->up);
+	v3d_set(stage->light.color, 1, 1, 1);
+	v3d_set(stage->scene.ambient, 0.12, 0.12, 0.12);
+	stage->scene.instance = &stage->instance;
+	stage->scene.light = &stage->light;
+	stage->scene.n_instances = stage->scene.n_lights = 1;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+	const double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+/* Draws the view of each model in turn, and adds the median seconds of each. */
+static int time_view(double seconds[2], struct study *study, const struct psr_model *const model[2], struct stage *stage,
+                     struct psr_frame *frame)
+{
+	struct render_settings settings;
+	double time[2][TRIALS];
+
+	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
+	for (int trial = 0; trial <= TRIALS; trial++)
+		for (int m = 0; m < 2; m++) {
+			const uint64_t start = clock_ns();
+			int rc;
+
+			stage->instance.model = model[m];
+			rc = renderer_draw(study->renderer, &stage->scene, &settings, study->pool, frame, study->err);
+			if (rc != PSR_OK)
+				return rc;
+			if (trial > 0) /* the first one warms */
+				time[m][trial - 1] = (double)(clock_ns() - start) * 1e-9;
+		}
+	for (int m = 0; m < 2; m++) {
+		qsort(time[m], TRIALS, sizeof time[0][0], compare_doubles);
+		seconds[m] += time[m][TRIALS / 2];
+	}
+	return PSR_OK;
+}
+
+/* Sums of squares over covered pixels, for decibels. */
+struct sums {
+	double square[2];
+	uint64_t n, n_wrong[2], n_inside; /* wrong: holes and leaks, of pixels inside */
+};
+
+static int judge_view(struct sums *sums, struct study *study, const struct psr_model *const model[2], struct stage *stage,
+                      const struct psr_frame *frame, const struct psr_source_planes *truth)
+{
+	struct render_settings settings;
+
+	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
+	for (int m = 0; m < 2; m++) {
+		struct psr_errors errors;
+		struct psr_frame drawn = *frame;
+		int rc;
+
+		stage->instance.model = model[m];
+		rc = renderer_draw(study->renderer, &stage->scene, &settings, study->pool, &drawn, study->err);
+		if (rc == PSR_OK)
+			rc = psr_errors_measure(&errors, &drawn, truth, psr_model_info(model[m])->spacing, study->err);
+		if (rc != PSR_OK)
+			return rc;
+		sums->square[m] += pow(10, -errors.psnr / 10) * (double)errors.n_covered;
+		sums->n_wrong[m] += errors.n_holes + errors.n_leaks;
+		sums->n += m == 0 ? errors.n_covered : 0;
+		sums->n_inside += m == 0 ? errors.n_inside : 0;
+	}
+	return PSR_OK;
+}
+
+int octree_compare(struct octree_drawn drawn[2], struct study *study, const struct study_model *of,
+                   const struct psr_model *const model[2], const struct octree_truth *truth)
+{
+	struct psr_frame quiet = { .width = OCTREE_SIDE, .height = OCTREE_SIDE, .rgb = truth->frame.rgb };
+	struct sums sums = { .n = 0 };
+	double seconds[2] = { 0, 0 };
+
+	for (int v = 0; v < OCTREE_VIEWS; v++) {
+		struct stage stage;
+		int rc;
+
+		set_stage(&stage, of, directions[v]);
+		rc = time_view(seconds, study, model, &stage, &quiet);
+		if (rc == PSR_OK)
+			rc = judge_view(&sums, study, model, &stage, &truth->frame, &truth->view[v]);
+		if (rc != PSR_OK)
+			return rc;
+	}
+	for (int m = 0; m < 2; m++)
+		drawn[m] = (struct octree_drawn){ OCTREE_VIEWS / seconds[m], -10 * log10(sums.square[m] / (double)sums.n),
+			                              1e6 * (double)sums.n_wrong[m] / (double)sums.n_inside };
+	return PSR_OK;
+}
+
+void octree_truth_fini(struct octree_truth *truth)
+{
+	for (int v = 0; v < OCTREE_VIEWS; v++) {
+		free(truth->view[v].rgb);
+		free(truth->view[v].coverage);
+		free(truth->view[v].depth);
+		free(truth->view[v].range);
+	}
+	psr_frame_free(&truth->frame);
+}
+
+int octree_truth_init(struct octree_truth *truth, struct study *study, const struct study_model *of)
+{
+	const size_t n = (size_t)OCTREE_SIDE * OCTREE_SIDE;
+	struct psr_source *source = NULL;
+	int rc = psr_source_create(&source, of->mesh, study->err);
+
+	memset(truth, 0, sizeof *truth);
+	if (rc == PSR_OK)
+		rc = psr_frame_alloc(&truth->frame, OCTREE_SIDE, OCTREE_SIDE, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH,
+		                     study->err);
+	for (int v = 0; rc == PSR_OK && v < OCTREE_VIEWS; v++) {
+		struct psr_source_planes *view = &truth->view[v];
+		struct stage stage;
+		const struct psr_source_shot shot = { source, &stage.scene, OCTREE_SIDE, OCTREE_SIDE, RAYS, study->n_threads };
+
+		*view = (struct psr_source_planes){ .rgb = malloc(n * sizeof *view->rgb),
+			                                .coverage = malloc(n * sizeof *view->coverage),
+			                                .depth = malloc(n * sizeof *view->depth),
+			                                .range = malloc(n * sizeof *view->range) };
+		set_stage(&stage, of, directions[v]);
+		if (view->rgb == NULL || view->coverage == NULL || view->depth == NULL || view->range == NULL)
+			rc = psr_fail(study->err, PSR_ERR_MEMORY, "no memory for pictures");
+		else
+			rc = psr_source_draw(&shot, view, study->err);
+	}
+	psr_source_destroy(source);
+	return rc;
+}
+
+int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,
+                  int levels)
+{
+	struct octree_build_options options;
+	struct psr_model_info info;
+	struct octree inner;
+	int rc;
+
+	octree_build_options_default(&options);
+	options.levels = levels;
+	rc = octree_of_mesh(tree, NULL, of->mesh, &options, study->err);
+	if (rc != PSR_OK)
+		return rc;
+	psr_octree_info(&info, *tree);
+	psr_octree_to_inner(&inner, *tree, &info);
+	return psr_model_create_octree(out, &info, &inner, NULL, study->err);
+}
