@@ -16,7 +16,10 @@ static void unexpected(struct conn *conn, const struct psr_message *message)
 static void open_next(struct conn *conn)
 {
 	const struct bench_model *model = &conn->shared->plan->model[conn->n_opened];
-	struct psr_msg_open msg = { .resolution = conn->capabilities & PSR_CAP_RESOLUTION ? model->pixels : 0 };
+	struct psr_msg_open msg = {
+		.resolution = conn->capabilities & PSR_CAP_RESOLUTION ? (uint16_t)model->pixels : 0,
+		.levels = conn->capabilities & PSR_CAP_LEVELS ? model->levels : 0,
+	};
 	struct psr_error err;
 	int code;
 

@@ -11,7 +11,8 @@ static int find_model(uint32_t *at, struct bench_plan *plan, const struct scene_
 	struct bench_model *grown;
 
 	for (*at = 0; *at < plan->n_models; ++*at)
-		if (strcmp(plan->model[*at].name, model->name) == 0 && plan->model[*at].pixels == pixels)
+		if (strcmp(plan->model[*at].name, model->name) == 0 && plan->model[*at].pixels == pixels
+		    && plan->model[*at].levels == model->opened.octree_levels)
 			return PSR_OK;
 	grown = realloc(plan->model, (plan->n_models + 1) * sizeof *grown);
 	if (grown == NULL)
@@ -20,6 +21,7 @@ static int find_model(uint32_t *at, struct bench_plan *plan, const struct scene_
 	memset(&grown[*at], 0, sizeof *grown);
 	strcpy(grown[*at].name, model->name);
 	grown[*at].pixels = pixels;
+	grown[*at].levels = model->opened.octree_levels;
 	memcpy(grown[*at].content_id, model->opened.content_id, sizeof grown->content_id);
 	plan->n_models++;
 	return PSR_OK;

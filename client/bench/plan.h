@@ -6,9 +6,10 @@
 #include "flight.h"
 #include "mix.h"
 
-struct bench_model {          /* a model at one size of pictures */
+struct bench_model {          /* a model at one size of pictures, or its first levels */
 	char name[PSR_WIRE_MAX_NAME + 1];
 	uint32_t pixels;         /* OPEN's resolution */
+	uint8_t levels;          /* OPEN's */
 	uint8_t content_id[16];
 };
 

@@ -177,7 +177,11 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 	    && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
-		if (!(model->opened.representations >> PSR_WIRE_REP_BLOCKS & 1))
+		if (model->opened.octree_levels > 0)
+			fprintf(stderr, "%s: %s has %u of its %u levels, for %u pixels; edges will look rough here without the others: "
+			        "raise --level, or leave it out\n", program, model->name, model->opened.octree_levels,
+			        model->opened.of_levels, model->opened.resolution);
+		else if (!(model->opened.representations >> PSR_WIRE_REP_BLOCKS & 1))
 			fprintf(stderr, "%s: %s is an octree for %u pixels; edges will look rough here; %.0f more --levels help "
 			        "if its file is finer\n", program, model->name, model->opened.resolution, ceil(log2(notes->coarsest)));
 		else if (resolution <= MOST)

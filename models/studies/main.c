@@ -46,6 +46,14 @@
 	"set ylabel '% over 1x1'\nset pointsize 1\nset xrange [-0.4:*]\nset offsets 0,0.4,0.02,0.02\n" \
 	"plot $table using 1:10:xtic(2) title 'blocks culled' lw 2 pt 7, '' using 1:9 title 'speed' lw 2 pt 5\n"
 
+/* A line a model, of four parts. */
+#define PLOT_PREFIXES \
+	"set style data linespoints\nset grid\nset key off\nset logscale x\nset xlabel 'MB that have come'\n" \
+	"set ylabel 'dB to the truth'\nset pointsize 1\nset offsets graph 0.05, graph 0.2, graph 0.05, graph 0.05\n" \
+	"stats $table using 1 nooutput\n" \
+	"plot for [m=0:STATS_records/4-1] $table every ::(4*m)::(4*m+3) using 3:7 lw 2 pt 7, \\\n" \
+	"     $table every 4::3 using 3:7:(word(strcol(2),1)) with labels left offset 1,0\n"
+
 #define NOTE_HIDDEN "hidden: no ray from a sample gets to the eye; wrong: culled though one does"
 #define NOTE_CULLING NOTE_HIDDEN "; speedup: over the first line."
 
@@ -90,7 +98,7 @@ static const struct study_kind tables[] = {
 	  NOTE_OCTREE, NULL },
 	{ "octree-prefixes", "[B] figure 13", "parts of packed octrees of 11 levels", table_octree_prefixes, "teapot,kittyhawk",
 	  "MB: of the file, that have come; levels, M pts: of the model that they are; below: decibels that it lacks of the\n"
-	  "whole; wrong: holes and leaks, of a million pixels inside.", NULL },
+	  "whole; wrong: holes and leaks, of a million pixels inside.", PLOT_PREFIXES },
 };
 static const struct study_kind figures[] = {
 	{ .name = "gaps", "figure 4.9", "methods of finding gaps", figure_gaps },

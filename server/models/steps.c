@@ -82,6 +82,7 @@ static void on_loaded(void *userdata)
 	o->model = NULL;
 	if (o->code == PSR_ERR_CANCELLED && o->waiters != NULL && !o->opener->is_stopped) {
 		catalogue_release(catalogue, loaded.reserved);
+		o->was_built = 0; /* and is in the cache by now */
 		load(o); /* a new request came while the job was ending */
 		return;
 	}

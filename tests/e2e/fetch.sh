@@ -60,12 +60,16 @@ check "from the same model as from the part of the file" \
 	[ "$(jq -r .model.content_id r.json)" = "$(psr-model info first.psr --json | jq -r .content_id)" ]
 is "and the report names them" "6 8 6" \
 	"$(jq -r '"\(.model.octree_levels) \(.model.of_levels) \(.request.models[0].octree_levels)"' r.json)"
+check "a picture too large for them says so" bash -c 'psr shot --server "$1" --model ball --level 5 --size 600x600 \
+	-o levels.png 2>&1 | grep -q "ball has 6 of its 8 levels, for .* pixels; .* raise --level, or leave it out"' - "$server"
 check "a replay draws them again" psr shot --server "$server" --replay r.json -o again.ppm
 check "byte for byte" cmp levels.ppm again.ppm
 check "without a level psrd draws the whole" shot --model ball --report r.json -o whole.ppm
 is "whose report names none" null "$(jq .model.octree_levels r.json)"
 check "which is another picture" bash -c '! cmp -s levels.ppm whole.ppm'
-rm -f first.psr r.json *.ppm
+check "psr bench measures them" psr bench --server "$server" --model ball --level 5 --frames 3 --warmup 0 --record rec --json
+check "which a recording names" grep -q '"octree_levels": *6' rec
+rm -f rec first.psr r.json levels.png *.ppm
 
 # Breaks: each connection is reset after so many bytes.
 start_relay --reset-down 150000 --rate-down 16 --split 5000
