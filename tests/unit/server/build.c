@@ -168,7 +168,7 @@ static void pictures_choose_the_resolution_of_a_build(void **state)
 
 static void pictures_beyond_the_protocol_cost_the_request(void **state)
 {
-	uint8_t bytes[] = { 0x17, 0, 0, 0, 0x13, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 1, 0, 'x' };
+	uint8_t bytes[] = { 0x17, 0, 0, 0, 0x13, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0xff, 0, 1, 0, 'x' };
 	struct psr_msg_opened opened;
 
 	(void)state;
