@@ -147,7 +147,7 @@ static void print_calibration(const struct psr_calibration *c)
 			printf("  pass %u                 ", rung->pass);
 		else
 			printf("  scale %u, spacing %-4g%s", rung->scale, rung->spacing_px,
-			       rung->is_smooth ? ", smooth" : "        ");
+			       rung->smooth ? ", smooth" : "        ");
 		printf("  %6.2f  %8.2f\n", figures.rmse, figures.times);
 	}
 }
@@ -168,7 +168,7 @@ static void add_calibration(cJSON *root, const struct psr_calibration *c)
 		take_rung(&figures, c, r);
 		cJSON_AddNumberToObject(rung, "scale", psr_ladder[r].scale);
 		cJSON_AddNumberToObject(rung, "spacing_px", psr_ladder[r].spacing_px);
-		cJSON_AddBoolToObject(rung, "smooth", psr_ladder[r].is_smooth);
+		cJSON_AddBoolToObject(rung, "smooth", psr_ladder[r].smooth);
 		cJSON_AddNumberToObject(rung, "pass", psr_ladder[r].pass);
 		cJSON_AddNumberToObject(rung, "rmse", figures.rmse);
 		cJSON_AddNumberToObject(rung, "time", figures.times);

@@ -8,7 +8,7 @@ void mix_line_init(struct mix_line *line)
 	memset(line, 0, sizeof *line);
 	scene_wish_init(&line->scene);
 	view_wish_init(&line->view);
-	quality_wish_init(&line->quality, 512, 512, "jpeg:85");
+	quality_wish_init(&line->quality, 512, 512, "good", "jpeg:85");
 	line->scene.is_quiet = 1;
 	line->path = "orbit";
 	line->weight = 1;

@@ -151,6 +151,8 @@ static int run(struct job *job, struct psr_error *err)
 		return code;
 	if (job->replay == NULL || wish->sink.output != NULL || wish->sink.depth != NULL)
 		job->frame.planes |= sink_planes(sink);
+	if (job->replay == NULL)
+		quality_settle(&job->frame, &wish->quality, psr_client_welcome(job->client)->capabilities);
 	quality_choose_codecs(&job->frame);
 	sink->scene = job->scene;
 	sink->frame = &job->frame;
@@ -192,7 +194,7 @@ int draw_main(const char *program, draw_parse *parse, int argc, char **argv)
 
 	scene_wish_init(&wish.scene);
 	view_wish_init(&wish.view);
-	quality_wish_init(&wish.quality, 800, 600, "lossless");
+	quality_wish_init(&wish.quality, 800, 600, "fine", "lossless");
 	code = parse(&wish, argc, argv, &err);
 	if (code == PSR_OK)
 		code = draw(&wish, &err);

@@ -38,7 +38,7 @@ static void fill_background(const struct psr_frame *frame, const struct psr_msg_
 static unsigned has_sharp(const struct psr_msg_frame *asked)
 {
 	const struct psr_msg_settings *settings = &asked->settings;
-	const int is_settled = asked->budget == PSR_WIRE_BUDGET_SETTINGS && settings->scale == 1 && settings->is_smooth;
+	const int is_settled = asked->budget == PSR_WIRE_BUDGET_SETTINGS && settings->scale == 1 && settings->smooth == 1;
 
 	return asked->flags & PSR_WIRE_FRAME_SHARP && !(is_settled && asked->color_codec != PSR_CODEC_JPEG);
 }

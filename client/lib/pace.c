@@ -34,7 +34,7 @@ static unsigned rung_of(const struct psr_msg_settings *settings)
 {
 	unsigned rung = 0;
 
-	while (ladder[rung].scale != settings->scale || ladder[rung].is_smooth != settings->is_smooth)
+	while (ladder[rung].scale != settings->scale || ladder[rung].is_smooth != settings->smooth)
 		rung++;
 	return rung;
 }
@@ -194,7 +194,7 @@ static void choose(struct pace *pace, struct pace_request *request, int is_sharp
 	pace->rung = is_new ? coarsest(pace) : choose_rung(pace);
 	memset(request, 0, sizeof *request);
 	request->settings.scale = ladder[pace->rung].scale;
-	request->settings.is_smooth = ladder[pace->rung].is_smooth;
+	request->settings.smooth = ladder[pace->rung].is_smooth;
 	request->settings.spacing_px = 1;
 	request->color_codec = PSR_CODEC_JPEG;
 	request->color_quality = is_new ? pace->wish.least_quality : choose_quality(pace, pace->rung);

@@ -56,7 +56,8 @@ static void add_price(cJSON *to, const char *name, const struct psr_msg_frame_en
 		cJSON_AddNumberToObject(json, "db", price.db);
 	cJSON_AddNumberToObject(json, "scale", price.settings.scale);
 	json_add_number(json, "spacing_px", price.settings.spacing_px);
-	cJSON_AddBoolToObject(json, "smooth", price.settings.is_smooth);
+	cJSON_AddBoolToObject(json, "smooth", price.settings.smooth);
+	cJSON_AddBoolToObject(json, "fine", price.settings.smooth == PSR_SMOOTH_FINE);
 	cJSON_AddNumberToObject(json, "pass", price.settings.pass);
 }
 
@@ -90,7 +91,7 @@ static void print_price(const char *what, const struct psr_msg_frame_end *end, u
 	else if (price.settings.scale > 1)
 		fprintf(stderr, "scale %u", price.settings.scale);
 	else
-		fprintf(stderr, "spacing %g%s", price.settings.spacing_px, price.settings.is_smooth ? ", smooth" : "");
+		fprintf(stderr, "spacing %g%s", price.settings.spacing_px, price.settings.smooth == PSR_SMOOTH_FINE ? ", fine" : price.settings.smooth ? ", smooth" : "");
 	fprintf(stderr, " for %.3g ms", price.ms);
 	if (!isnan(price.db))
 		fprintf(stderr, " and %.1f dB", price.db);

@@ -131,7 +131,8 @@ static cJSON *make_report(const struct shot_facts *facts)
 	add_camera(report, &event->begin->camera);
 	cJSON_AddNumberToObject(report, "scale", event->begin->settings.scale);
 	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
-	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.is_smooth);
+	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.smooth);
+	cJSON_AddBoolToObject(report, "fine", event->begin->settings.smooth == PSR_SMOOTH_FINE);
 	cJSON_AddNumberToObject(report, "pass", event->begin->pass);
 	cJSON_AddStringToObject(report, "status", status[event->end->status < 3 ? event->end->status : 0]);
 	cJSON_AddNumberToObject(report, "error_px", event->end->error_px);

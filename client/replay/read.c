@@ -218,7 +218,7 @@ static void read_planes(struct reader *reader, struct psr_msg_frame *frame, cons
 				frame->planes |= 1u << plane;
 }
 
-/* A report of psr 0.2 and before has neither scale nor pass. */
+/* A report of psr 0.2 and before has neither scale, pass nor fine. */
 static void read_detail(struct reader *reader, struct psr_msg_frame *frame, const cJSON *request)
 {
 	struct psr_msg_settings *settings = &frame->settings;
@@ -235,7 +235,9 @@ static void read_detail(struct reader *reader, struct psr_msg_frame *frame, cons
 	if (cJSON_HasObjectItem(request, "pass"))
 		settings->pass = (uint8_t)get_number(reader, request, "pass", 0, PSR_WIRE_MAX_PASS);
 	settings->spacing_px = get_number(reader, request, "spacing_px", 1.0 / 64, 64);
-	settings->is_smooth = (uint8_t)get_flag(reader, request, "smooth");
+	settings->smooth = (uint8_t)get_flag(reader, request, "smooth");
+	if (cJSON_HasObjectItem(request, "fine") && get_flag(reader, request, "fine"))
+		settings->smooth = PSR_SMOOTH_FINE;
 	frame->pass_limit = (uint16_t)get_number(reader, request, "passes", 0, 16);
 }
 

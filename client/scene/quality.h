@@ -7,7 +7,7 @@
 
 struct quality_wish {
 	uint32_t size[2];
-	const char *name; /* draft, good, best */
+	const char *name; /* draft, good, fine, best */
 	double spacing;
 	int64_t passes;
 	int is_smooth, is_plain, has_name, has_spacing, has_passes;
@@ -16,7 +16,8 @@ struct quality_wish {
 	int n_said; /* how many of the other options were given */
 };
 
-void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *codec);
+/* name: the quality of who names none. */
+void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *name, const char *codec);
 void quality_add_options(struct optlist *list, struct quality_wish *wish);
 void quality_add_codec_option(struct optlist *list, struct quality_wish *wish); /* of still pictures */
 void quality_add_budget_option(struct optlist *list, struct quality_wish *wish); /* where each picture stands alone */
@@ -24,6 +25,10 @@ int quality_is_said(const struct quality_wish *wish); /* any of these options wa
 
 /* Sets size, settings or budget, passes and colour codec of the request. ARG, LIMIT. */
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);
+
+/* With the planes in the request: a fine picture that nobody named is a good one where a server with these capabilities,
+ * enum psr_cap, cannot draw it. */
+void quality_settle(struct psr_msg_frame *frame, const struct quality_wish *wish, uint64_t capabilities);
 
 #define QUALITY_BUDGET_TEXT 40
 

@@ -231,7 +231,7 @@ static int parse(struct reader *reader, char *text, struct psr_error *err)
 	reader->expect = (struct expect_reader){ &reader->now.expect, &reader->file };
 	scene_wish_init(&reader->now.scene);
 	view_wish_init(&reader->now.view);
-	quality_wish_init(&reader->now.quality, 800, 600, "lossless");
+	quality_wish_init(&reader->now.quality, 800, 600, "good", "lossless");
 	expect_init(&reader->now.expect);
 	add_options(&list, reader);
 	code = wordfile_parse(&reader->file, text, err);

@@ -111,7 +111,7 @@ void link_frame(struct psr_msg_frame *frame, struct pace_request *request, const
 	}
 	if (request->is_sharp && (is_direct || !wish->is_smooth)) {
 		settings->scale = 1;
-		settings->is_smooth = wish->is_smooth != 0;
+		settings->smooth = wish->is_smooth != 0;
 		frame->color_codec = wish->planes >> PSR_PLANE_COLOR & 1 ? PSR_CODEC_ZSTD : 0;
 		frame->color_quality = 0;
 	} else if (request->is_sharp) {

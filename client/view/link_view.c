@@ -197,7 +197,7 @@ static int is_sharp(const struct link_request *request, const struct psr_msg_fra
 {
 	const int is_lossy = begin->planes >> PSR_PLANE_COLOR & 1 && begin->color_codec == PSR_CODEC_JPEG;
 
-	return request->is_rest && begin->settings.scale == 1 && begin->settings.is_smooth == request->is_smooth
+	return request->is_rest && begin->settings.scale == 1 && begin->settings.smooth == request->is_smooth
 	       && !is_lossy;
 }
 

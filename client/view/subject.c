@@ -49,7 +49,7 @@ int subject_init(struct subject *subject, const struct scene_wish *scene, const 
 	subject->ambient = scene->ambient;
 	memcpy(subject->background, scene->background, sizeof subject->background);
 	subject->spacing = quality->settings.spacing_px;
-	subject->is_smooth = quality->settings.is_smooth;
+	subject->is_smooth = quality->settings.smooth != 0;
 	subject->passes = quality->pass_limit;
 	return code;
 }
@@ -354,7 +354,7 @@ char *subject_command(const struct subject *subject, const struct hand *hand, co
 	put_lights(to, subject, &hand->camera);
 	fprintf(to, " --background '#%02x%02x%02x' --spacing %.17g --passes %u%s", subject->background[0],
 	        subject->background[1], subject->background[2], subject->spacing, subject->passes,
-	        subject->is_smooth ? "" : " --no-smooth");
+	        subject->is_smooth ? " --smooth" : " --no-smooth");
 	if (subject->stage != NULL)
 		put_option(to, "show", subject->stage_name);
 	if (fclose(to) == 0)

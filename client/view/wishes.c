@@ -8,7 +8,7 @@ void wishes_init(struct wishes *wishes, uint32_t width, uint32_t height, double 
 	wishes->fps = fps;
 	scene_wish_init(&wishes->scene);
 	view_wish_init(&wishes->camera);
-	quality_wish_init(&wishes->quality, width, height, "lossless");
+	quality_wish_init(&wishes->quality, width, height, "good", "lossless");
 }
 
 void wishes_fini(struct wishes *wishes)

@@ -56,7 +56,7 @@ static int draw(struct calibration *c, struct psr_calibrated *out, const struct 
 
 	psr_settings_default(&settings, frame.width, frame.height);
 	settings.spacing_px = rung->spacing_px;
-	settings.is_smooth = rung->is_smooth;
+	settings.smooth = rung->smooth;
 	settings.pass = rung->pass;
 	for (int i = 0; i < 3 && (i == 0 || ms < SLOW_MS); i++) {
 		const uint64_t start = clock_ns();

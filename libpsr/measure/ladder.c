@@ -77,7 +77,7 @@ static int render(const struct call *call, const struct ladder_rung *rung, const
 	settings.width = frame->width;
 	settings.height = frame->height;
 	settings.cancel = (struct psr_cancel){ NULL, NULL };
-	if (settings.pass == 0)
+	if (settings.pass == 0 && settings.smooth != PSR_SMOOTH_FINE)
 		return renderer_draw(renderer, scene, &settings, pool, frame, call->err);
 	if (*refiner == NULL)
 		rc = refiner_create(refiner, renderer, call->err);

@@ -21,11 +21,11 @@ const struct psr_rung psr_ladder[PSR_RUNGS] = {
 	{ .scale = 1, .spacing_px = 2 },
 	{ .scale = 1, .spacing_px = 1.5 },
 	{ .scale = 1, .spacing_px = 1 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 1 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 2 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 3 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 4 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 1 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 2 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 3 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 4 },
 };
 
 int calibration_validate(const struct psr_calibration *calibration, struct psr_error *err)

@@ -11,7 +11,7 @@
 /* Settings from the cheapest to the best, of psr_settings and of a scale: the picture is drawn at 1/scale of its size.
  * docs/format.md lists them; other ones would need another version of CALB. Spacings are multiples of 2^-16. */
 struct psr_rung {
-	uint8_t scale, is_smooth, pass;
+	uint8_t scale, smooth, pass;
 	double spacing_px;
 };
 extern const struct psr_rung psr_ladder[PSR_RUNGS];

@@ -267,7 +267,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->has_sheer = plan->has_thin = 0;
 	plan->caster = NO_CASTER;
 	plan->with_splats = settings->with_splats;
-	plan->is_smooth = settings->is_smooth;
+	plan->is_smooth = settings->smooth != PSR_SMOOTH_NONE;
 	plan->is_wide = settings->is_wide;
 	plan->cancel = settings->cancel;
 	plan->exponent = scene_exponent(scene);

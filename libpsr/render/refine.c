@@ -15,6 +15,7 @@
 #define MARGIN 64
 #define STEP_X (WINDOW_WIDTH - 2 * MARGIN)
 #define STEP_Y (WINDOW_HEIGHT - 2 * MARGIN)
+#define WINDOW_PIXELS ((size_t)WINDOW_WIDTH * WINDOW_HEIGHT)
 /* Pixels from the plain frame's edges, which are up to a sample's distance outside the silhouette, to its inside. A gap
  * between two things that the plain frame joins ends nearer to an edge. Measured: with two instead of four a wheel at
  * 256 pixels loses 1.7 dB. */
@@ -25,7 +26,8 @@ _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
 
 struct refiner {
 	struct psr_renderer *renderer;
-	float *depth; /* of a window */
+	float *depth;        /* of a window, */
+	uint8_t *rgb;        /* and, of fine pictures, its colours; NULL before the first */
 	uint8_t *is_inside; /* by pixel of the plain frame, then as much scratch */
 	size_t inside_size;
 	/* What is_inside was found for: the passes of a still share it. */
@@ -34,6 +36,7 @@ struct refiner {
 	struct psr_camera camera;
 	struct render_settings settings;
 	const uint8_t *srgb;   /* of 16-bit linear light */
+	uint32_t linear[256];  /* 16-bit linear light of sRGB */
 };
 
 /* A window's part of the frame: its pixels, and the first sub-pixel of the first one in the window. */
@@ -41,6 +44,7 @@ struct part {
 	const struct refiner *refiner;
 	struct psr_frame *frame;
 	struct wide_light light; /* of sub-pixels */
+	const uint8_t *rgb;      /* instead, of those of a fine picture; else NULL */
 	uint32_t x0, x1, y0, left, top, stride;
 	unsigned pass;
 };
@@ -53,6 +57,8 @@ struct still {
 	struct psr_pool *pool;
 	struct psr_frame *frame;
 	struct psr_error *err;
+	unsigned pass; /* 1 of a fine picture */
+	int is_fine;
 };
 
 struct erosion {
@@ -67,12 +73,14 @@ int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct p
 	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	r->renderer = renderer;
-	r->depth = psr_alloc_array((size_t)WINDOW_WIDTH * WINDOW_HEIGHT, sizeof *r->depth);
+	r->depth = psr_alloc_array(WINDOW_PIXELS, sizeof *r->depth);
 	if (r->depth == NULL) {
 		free(r);
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	}
 	r->srgb = psr_srgb_of_16_bits();
+	for (int code = 0; code < 256; code++)
+		r->linear[code] = (uint32_t)((double)psr_srgb_to_linear[code] * 65535 + 0.5);
 	*out = r;
 	return PSR_OK;
 }
@@ -82,6 +90,7 @@ void refiner_destroy(struct refiner *r)
 	if (r == NULL)
 		return;
 	psr_free(r->depth);
+	psr_free(r->rgb);
 	psr_free_huge(r->is_inside, r->inside_size);
 	placed_clear(&r->placed);
 	free(r);
@@ -89,13 +98,13 @@ void refiner_destroy(struct refiner *r)
 
 uint64_t refiner_bytes(const struct refiner *r)
 {
-	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * sizeof *r->depth + r->inside_size
+	return sizeof *r + WINDOW_PIXELS * (sizeof *r->depth + (r->rgb != NULL ? 3 : 0)) + r->inside_size
 	       + placed_bytes(&r->placed);
 }
 
 uint64_t refiner_most_bytes(uint64_t n_pixels)
 {
-	return sizeof(struct refiner) + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * sizeof(float) + 2 * n_pixels;
+	return sizeof(struct refiner) + WINDOW_PIXELS * (sizeof(float) + 3) + 2 * n_pixels;
 }
 
 uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
@@ -125,6 +134,19 @@ static void average_color(const struct part *part, size_t first, size_t at)
 	}
 }
 
+/* The same of a fine picture's 2x2 colours, which smoothing has clamped. */
+static void average_codes(const struct part *part, size_t first, size_t at)
+{
+	const uint8_t *top = part->rgb + 3 * first, *bottom = top + 3 * (size_t)part->stride;
+	const uint32_t *linear = part->refiner->linear;
+
+	for (size_t c = 0; c < 3; c++) {
+		const uint32_t sum = linear[top[c]] + linear[top[c + 3]] + linear[bottom[c]] + linear[bottom[c + 3]];
+
+		part->frame->rgb[3 * at + c] = part->refiner->srgb[(sum + 2) >> 2];
+	}
+}
+
 static void find_nearest(const struct part *part, size_t first, size_t at)
 {
 	const uint32_t side = 1u << part->pass;
@@ -149,7 +171,9 @@ static void average_row(int row, void *userdata)
 			(size_t)(part->top + (uint32_t)row * side) * part->stride + part->left + (x - part->x0) * side;
 		const size_t at = (size_t)y * part->frame->width + x;
 
-		if (part->frame->rgb != NULL)
+		if (part->rgb != NULL)
+			average_codes(part, first, at);
+		else if (part->frame->rgb != NULL)
 			average_color(part, first, at);
 		if (part->frame->depth != NULL)
 			find_nearest(part, first, at);
@@ -196,25 +220,27 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	const struct refiner *r = still->refiner;
 	const struct render_settings *settings = still->settings;
 	struct psr_frame *frame = still->frame;
-	const unsigned pass = settings->pass;
+	const unsigned pass = still->pass;
+	const int is_wide = frame->rgb != NULL && !still->is_fine;
 	const uint32_t width = settings->width << pass, height = settings->height << pass;
 	const uint32_t left = i * STEP_X, top = j * STEP_Y;
 	const int is_last_x = width - left <= WINDOW_WIDTH, is_last_y = height - top <= WINDOW_HEIGHT;
 	struct render_settings window = *settings;
 	struct psr_frame fine;
 
-	window.with_splats = 1;
-	window.is_smooth = 0;
-	window.is_wide = frame->rgb != NULL;
+	window.with_splats = !still->is_fine;
+	window.smooth = still->is_fine ? PSR_SMOOTH_EDGES : PSR_SMOOTH_NONE;
+	window.is_wide = is_wide;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
 	window.width = is_last_x ? width - left : WINDOW_WIDTH;
 	window.height = is_last_y ? height - top : WINDOW_HEIGHT;
 
 	fine = (struct psr_frame){ .width = window.width,
 		                       .height = window.height,
+		                       .rgb = frame->rgb != NULL && still->is_fine ? r->rgb : NULL,
 		                       .depth = frame->depth != NULL ? r->depth : NULL };
 	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
-	renderer_set_inside(r->renderer, &inside);
+	renderer_set_inside(r->renderer, still->is_fine ? NULL : &inside);
 	const int rc = renderer_draw(r->renderer, still->scene, &window, still->pool, &fine, still->err);
 	renderer_set_inside(r->renderer, NULL);
 	if (rc)
@@ -222,7 +248,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	const uint32_t from_x = i ? MARGIN : 0, to_x = is_last_x ? window.width : WINDOW_WIDTH - MARGIN;
 	const uint32_t from_y = j ? MARGIN : 0, to_y = is_last_y ? window.height : WINDOW_HEIGHT - MARGIN;
 	struct part part = {
-		.refiner = r, .frame = frame, .light = renderer_light(r->renderer), .pass = pass,
+		.refiner = r, .frame = frame, .light = renderer_light(r->renderer), .rgb = fine.rgb, .pass = pass,
 		.stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
@@ -314,6 +340,18 @@ static int find_inside(const struct still *still)
 	return rc;
 }
 
+static int prepare(const struct still *still)
+{
+	struct refiner *r = still->refiner;
+
+	if (!still->is_fine)
+		return find_inside(still);
+	if (r->rgb == NULL && still->frame->rgb != NULL)
+		r->rgb = psr_alloc_array(WINDOW_PIXELS, 3);
+	return r->rgb != NULL || still->frame->rgb == NULL
+	               ? PSR_OK : psr_fail(still->err, PSR_ERR_MEMORY, "no memory for a fine picture");
+}
+
 static uint32_t n_windows(uint32_t side, uint32_t window, uint32_t step)
 {
 	return side <= window ? 1 : 1 + (side - window + step - 1) / step;
@@ -322,8 +360,9 @@ static uint32_t n_windows(uint32_t side, uint32_t window, uint32_t step)
 int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
                  struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
-	const struct still still = { r, scene, settings, pool, frame, err };
-	const unsigned pass = settings->pass;
+	const int is_fine = settings->pass == 0 && settings->smooth == PSR_SMOOTH_FINE;
+	const unsigned pass = is_fine ? 1 : settings->pass;
+	const struct still still = { r, scene, settings, pool, frame, err, pass, is_fine };
 	int rc;
 
 	if (pass > PSR_MAX_PASS)
@@ -343,7 +382,7 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	memset(&frame->report, 0, sizeof frame->report);
 	for (int e = 0; e < PSR_N_EFFECTS; e++)
 		frame->report.effect[e].why = PSR_WHY_NOTHING; /* until a window says otherwise */
-	rc = find_inside(&still);
+	rc = prepare(&still);
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x && rc == PSR_OK; i++)
 			rc = draw_window(&still, i, j);

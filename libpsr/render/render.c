@@ -54,11 +54,11 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
 
 	render_settings_default(&settings, asked->width, asked->height);
 	settings.spacing_px = asked->spacing_px;
-	settings.is_smooth = asked->is_smooth;
+	settings.smooth = asked->smooth;
 	settings.pass = asked->pass;
 	if (asked->cancel.is_cancelled != NULL)
 		settings.cancel = (struct psr_cancel){ is_cancelled, &latch };
-	if (settings.pass == 0)
+	if (settings.pass == 0 && settings.smooth != PSR_SMOOTH_FINE)
 		return renderer_draw(renderer, scene, &settings, pool, frame, err);
 	const int rc = *refiner != NULL ? PSR_OK : refiner_create(refiner, renderer, err);
 	return rc ? rc : refiner_draw(*refiner, scene, &settings, pool, frame, err);

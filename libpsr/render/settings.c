@@ -23,6 +23,8 @@ int settings_validate(const struct render_settings *settings, struct psr_error *
 		return psr_fail(err, PSR_ERR_ARG, "unknown gap method %d", (int)settings->gap_method);
 	if (!(settings->spacing_px >= 1.0 / 64 && settings->spacing_px <= 64))
 		return psr_fail(err, PSR_ERR_ARG, "a spacing of %g is not within 1/64..64 pixels", settings->spacing_px);
+	if ((unsigned)settings->smooth > PSR_SMOOTH_FINE)
+		return psr_fail(err, PSR_ERR_ARG, "unknown smoothing %d", (int)settings->smooth);
 	if (settings->cell_bias < -4 || settings->cell_bias > 4)
 		return psr_fail(err, PSR_ERR_ARG, "a bias of cells of %d is not within -4..4", settings->cell_bias);
 	if (settings->shadow_side < 64 || settings->shadow_side > PSR_MAX_SHADOW_SIDE)

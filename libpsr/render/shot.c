@@ -9,7 +9,7 @@ void psr_shot_default(struct psr_shot *shot, uint32_t width, uint32_t height)
 {
 	memset(shot, 0, sizeof *shot);
 	psr_settings_default(&shot->settings, width, height);
-	shot->settings.is_smooth = 1;
+	shot->settings.smooth = PSR_SMOOTH_EDGES;
 	shot->planes = 1 << PSR_PLANE_COLOR;
 	shot->fov_y = FOV;
 	shot->ambient = AMBIENT;

@@ -27,7 +27,7 @@ struct psr_window {
 struct render_settings {
 	uint32_t width, height; /* these as in struct psr_settings */
 	double spacing_px;
-	int is_smooth;
+	enum psr_smooth smooth; /* FINE for refiner_draw() only */
 	unsigned pass;          /* read by refiner_draw() only */
 	struct psr_cancel cancel; /* answers 0 never again after another answer; renderer_finish() asks it, too */
 
@@ -68,9 +68,9 @@ void refiner_destroy(struct refiner *refiner); /* NULL is fine */
 /* Without the renderer's: two bytes a pixel of the largest picture, the rest independent of its size. */
 uint64_t refiner_bytes(const struct refiner *refiner);
 uint64_t refiner_most_bytes(uint64_t n_pixels); /* for frames of so many pixels */
-uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass); /* pixels that it draws at once */
+uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass); /* pixels that it draws at once; fine: pass 1 */
 
-/* psr_render() of settings->pass. Blocks choose levels and depth buffers for 2^p x 2^p sub-pixels a pixel, so that
+/* psr_render() of settings->pass, or of a fine picture. Blocks choose levels and depth buffers for 2^p x 2^p sub-pixels a pixel, so that
  * samples no longer fill whole pixels. Gaps between samples are closed well inside of the pixels that pass 0 covers.
  * The finer picture is drawn in windows, so that memory does not grow with the pass; settings->window is that of a
  * whole picture. */

@@ -43,13 +43,14 @@ static void add_requests(struct price_set *set)
 
 	for (size_t i = 0; i < sizeof spacing / sizeof spacing[0]; i++)
 		add(set, "spacing", "spacing %g", spacing[i])->settings.spacing_px = spacing[i];
-	add(set, "smoothing", "smooth")->settings.is_smooth = 1;
+	add(set, "smoothing", "smooth")->settings.smooth = PSR_SMOOTH_EDGES;
 	for (int i = 1; i <= 4; i += 2) {
 		struct ladder_rung *rung = add(set, "smoothing", "smooth, spacing %g", spacing[i]);
 
-		rung->settings.is_smooth = 1;
+		rung->settings.smooth = PSR_SMOOTH_EDGES;
 		rung->settings.spacing_px = spacing[i];
 	}
+	add(set, "passes", "fine")->settings.smooth = PSR_SMOOTH_FINE;
 	for (unsigned pass = 1; pass <= PSR_MAX_PASS; pass++)
 		add(set, "passes", "pass %u", pass)->settings.pass = pass;
 	for (unsigned pass = 1; pass <= 2; pass++) {
@@ -86,7 +87,10 @@ static int add_resolutions(struct price_set *set, const struct psr_mesh *mesh, u
 		add(set, "resolution", "model of %u", resolution[i])->model = model;
 		struct ladder_rung *rung = add(set, "resolution", "model of %u, smooth", resolution[i]);
 		rung->model = model;
-		rung->settings.is_smooth = 1;
+		rung->settings.smooth = PSR_SMOOTH_EDGES;
+		rung = add(set, "resolution", "model of %u, fine", resolution[i]);
+		rung->model = model;
+		rung->settings.smooth = PSR_SMOOTH_FINE;
 		rung = add(set, "resolution", "model of %u, pass 2", resolution[i]);
 		rung->model = model;
 		rung->settings.pass = 2;

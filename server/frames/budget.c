@@ -1,14 +1,15 @@
 #include "budget.h"
 #include <math.h>
 #include <string.h>
+#include "psr/render.h"
 
 /* From the cheapest to the best. Spacings are multiples of 2^-16: a report holds them. */
 const struct psr_msg_settings budget_ladder[BUDGET_RUNGS] = {
 	{ .scale = 4, .spacing_px = 1 }, { .scale = 2, .spacing_px = 1 },
 	{ .scale = 1, .spacing_px = 2 }, { .scale = 1, .spacing_px = 1.5 }, { .scale = 1, .spacing_px = 1 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 1 }, { .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 2 },
-	{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 3 }, { .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 4 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 1 }, { .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 2 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 3 }, { .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 4 },
 };
 
 static int can_refine(uint32_t planes)
@@ -22,12 +23,12 @@ static int is_offered(const struct psr_msg_settings *rung, const struct budget_v
 		return 0;
 	if (rung->pass > 0)
 		return can_refine(view->planes);
-	return !rung->is_smooth || view->planes >> PSR_PLANE_COLOR & 1; /* smoothing changes colour alone */
+	return !rung->smooth || view->planes >> PSR_PLANE_COLOR & 1; /* smoothing changes colour alone */
 }
 
 static int is_rung(const struct psr_msg_settings *rung, const struct psr_msg_settings *settings)
 {
-	const int is_same_edge = rung->pass > 0 || rung->is_smooth == settings->is_smooth; /* passes ignore smoothing */
+	const int is_same_edge = rung->pass > 0 || rung->smooth == settings->smooth; /* passes ignore smoothing */
 
 	return rung->scale == settings->scale && rung->pass == settings->pass && is_same_edge
 	       && rung->spacing_px == settings->spacing_px;
@@ -156,6 +157,6 @@ int budget_is_asked(const struct psr_msg_frame *request)
 unsigned budget_most_pass(const struct psr_msg_frame *request)
 {
 	if (request->budget == PSR_WIRE_BUDGET_SETTINGS)
-		return request->settings.pass;
+		return request->settings.pass == 0 && request->settings.smooth == PSR_SMOOTH_FINE ? 1 : request->settings.pass;
 	return budget_is_asked(request) && can_refine(request->planes) ? PSR_WIRE_MAX_PASS : 0;
 }

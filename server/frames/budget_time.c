@@ -41,7 +41,7 @@ static void work_of(double work[BUDGET_N_WORK], const struct budget_view *view, 
 	} else {
 		work[BUDGET_SAMPLES] = counts->n_samples + BLOCK * counts->n_blocks + drawn;
 		work[BUDGET_PIXELS] = EMPTY_PIXEL * drawn + lit;
-		work[BUDGET_SMOOTH] = settings->is_smooth ? EMPTY_PIXEL * drawn + least(covered, drawn) : 0;
+		work[BUDGET_SMOOTH] = settings->smooth ? EMPTY_PIXEL * drawn + least(covered, drawn) : 0;
 	}
 	work[BUDGET_ANSWER] = n_pixels / (settings->scale * settings->scale);
 	if (settings->scale != view->kept.scale || settings->pass != view->kept.pass)

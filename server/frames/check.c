@@ -8,7 +8,8 @@
 int frame_check(const struct psr_msg_frame *frame, uint32_t id, uint16_t view, int64_t max_pixels,
                 struct psr_error *err)
 {
-	const int is_chosen = budget_is_asked(frame) || frame->settings.pass > 0;
+	const int is_refined = frame->settings.pass > 0 || frame->settings.smooth == PSR_SMOOTH_FINE;
+	const int is_chosen = budget_is_asked(frame) || is_refined;
 	uint64_t n_pixels = (uint64_t)frame->width * frame->height;
 
 	if (view >= SCHEDULE_VIEWS)
@@ -32,16 +33,16 @@ int frame_check(const struct psr_msg_frame *frame, uint32_t id, uint16_t view, i
 	if (frame->pass_limit > PSR_MAX_PASS)
 		return psr_fail(err, PSR_ERR_LIMIT, "this server refines a picture in %d passes at most, not in %u", PSR_MAX_PASS,
 		                frame->pass_limit);
-	if (frame->settings.pass > 0 && frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
+	if (is_refined && frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "this server refines colour and depth; other planes take settings of pass 0, not %u",
-		                frame->settings.pass);
+		                "this server refines colour and depth; other planes take settings of pass 0, not %u, and smooth 0 "
+		                "or 1, not %u", frame->settings.pass, frame->settings.smooth);
 	if (frame->budget == PSR_WIRE_BUDGET_RMSE && !(frame->planes & 1u << PSR_PLANE_COLOR))
 		return psr_fail(err, PSR_ERR_ARG, "a budget of RMSE (4) is one of colour; ask for that plane");
 	if (is_chosen && (frame->pass_limit > 0 || frame->flags & PSR_WIRE_FRAME_SHARP))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "a budget of time, error or RMSE, and settings of a pass, say how the only picture is drawn: "
-		                "they go with pass_limit 0 and without sharp (flag 2)");
+		                "a budget of time, error or RMSE, and settings of a pass or a fine picture, say how the only picture "
+		                "is drawn: they go with pass_limit 0 and without sharp (flag 2)");
 	return PSR_OK;
 }
 

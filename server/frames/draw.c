@@ -295,7 +295,7 @@ static int draw_picture(struct drawing *d, struct draw_worker *worker, struct ps
 	scene.camera = d->request.camera;
 	psr_settings_default(&settings, picture->width, picture->height);
 	settings.spacing_px = d->settings.spacing_px;
-	settings.is_smooth = d->settings.is_smooth;
+	settings.smooth = d->settings.smooth;
 	settings.pass = d->settings.pass > 0 ? d->settings.pass : d->refine;
 	settings.cancel = (struct psr_cancel){ is_cancelled_or_yields, d };
 	code = psr_render(worker->renderer, &scene, &settings, d->pool, picture, err);

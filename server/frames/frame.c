@@ -180,6 +180,7 @@ int frame_is_slight(const struct frame *frame)
 	const struct scene *scene = frame->drawing.scene;
 
 	return frame->request.n_frames == 1 && frame->drawing.settings.pass == 0
+	       && frame->drawing.settings.smooth != PSR_SMOOTH_FINE
 	       && (uint64_t)request->width * request->height <= SLIGHT_PIXELS
 	       && scene->scene.n_instances <= SLIGHT_INSTANCES && scene_blocks(scene) <= SLIGHT_BLOCKS
 	       && scene_shadow_lights(scene) == 0 && !scene_has_sheer(scene);

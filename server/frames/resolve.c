@@ -19,7 +19,7 @@ int draw_is_sharp(const struct psr_msg_frame *request)
 	const struct psr_msg_settings settings = settings_of(request);
 	const int is_lossless = request->color_codec == PSR_CODEC_RAW || request->color_codec == PSR_CODEC_ZSTD;
 
-	return settings.scale == 1 && settings.is_smooth && is_lossless;
+	return settings.scale == 1 && settings.smooth == 1 && is_lossless;
 }
 
 /* A long frame ends by the limit on its time on cores: the budget stays below it with all of them at work. */
@@ -109,7 +109,7 @@ void resolve_settings(struct drawing *d, const struct budget_learnt *learnt, str
 	d->settings = d->choice.chosen.settings;
 	if (d->is_sharp) {
 		d->settings.scale = 1;
-		d->settings.is_smooth = 1;
+		d->settings.smooth = 1;
 	}
 }
 

@@ -284,7 +284,7 @@ static void measure_all(struct bench *bench, struct psr_model *model, struct psr
 	subject_init(s, "plain", model, 1);
 	measure(bench, s);
 	subject_init(s, "smooth", model, 1);
-	s->settings.is_smooth = 1;
+	s->settings.smooth = 1;
 	measure(bench, s);
 	subject_init(s, "close", model, 1);
 	s->scene.camera.fov_y /= 16;

@@ -163,7 +163,7 @@ static void prepare(struct stage *stage, struct price_side *side, const struct l
 	render_settings_default(&side->settings, SIDE, SIDE);
 	side->settings.cull_tests &= ~look->without_tests;
 	side->settings.is_full = look->is_full;
-	side->settings.is_smooth = look->is_smooth;
+	side->settings.smooth = look->is_smooth;
 	side->has_depth = look->has_depth;
 	side->scene = scene;
 	side->userdata = stage;

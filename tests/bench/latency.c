@@ -234,7 +234,7 @@ static void compare(struct run *run, struct psr_model *model, double *warped, do
 		scene.background[c] = psr_srgb_to_linear[run->wish.background[c]];
 	}
 	psr_settings_default(&settings, WIDTH, HEIGHT);
-	settings.is_smooth = run->wish.is_smooth;
+	settings.smooth = run->wish.is_smooth;
 	if (psr_renderer_create(&renderer, &err) != PSR_OK
 	    || psr_frame_alloc(&truth, WIDTH, HEIGHT, 1 << PSR_PLANE_COLOR | 1 << PSR_PLANE_DEPTH, &err) != PSR_OK)
 		report_die("truth", err.text);

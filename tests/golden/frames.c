@@ -75,7 +75,7 @@ static void draw(struct golden *out, const struct shot *shot, const struct way *
 	struct psr_frame frame;
 	struct psr_error err;
 	psr_settings_default(&settings, shot->size[0], shot->size[1]);
-	settings.is_smooth = shot->is_smooth;
+	settings.smooth = shot->smooth;
 	settings.pass = shot->n_passes;
 	if (psr_frame_alloc(&frame, shot->size[0], shot->size[1], shot->planes, &err)
 	    || psr_render(way->renderer, &shot->scene, &settings, way->pool, &frame, &err))

@@ -20,6 +20,7 @@ struct words {
 	uint32_t n_instances;
 	uint32_t size[2];
 	int is_smooth, is_plain;
+	const char *quality; /* NULL, or fine */
 	int64_t n_passes;
 	struct psr_camera_wish wish;
 	double fov, ortho, ambient;
@@ -111,7 +112,7 @@ static int end_shot(struct reader *reader, struct psr_error *err)
 	memset(&shot, 0, sizeof shot);
 	snprintf(shot.name, sizeof shot.name, "%s", now->name);
 	memcpy(shot.size, now->size, sizeof shot.size);
-	shot.is_smooth = !now->is_plain;
+	shot.smooth = now->quality != NULL ? PSR_SMOOTH_FINE : now->is_plain ? PSR_SMOOTH_NONE : PSR_SMOOTH_EDGES;
 	shot.n_passes = (unsigned)now->n_passes;
 	int rc = place_instances(&shot, reader, err);
 	for (unsigned plane = 0; !rc && plane < PSR_N_PLANES; plane++)
@@ -198,6 +199,7 @@ int shots_read(const char *path, const struct psr_model *(*open)(const char *nam
 		{ .name = "ambient", .type = PSR_OPT_REAL, .value = &now->ambient, .seen = &now->has_ambient },
 		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &now->is_smooth },
 		{ .name = "no-smooth", .type = PSR_OPT_FLAG, .value = &now->is_plain },
+		{ .name = "quality", .type = PSR_OPT_STRING, .value = &now->quality },
 		{ .name = "passes", .type = PSR_OPT_INT, .value = &now->n_passes },
 		{ .name = "background", .type = PSR_OPT_COLOR, .value = now->background },
 		{ .name = NULL },

@@ -11,7 +11,7 @@
 struct shot {
 	char name[SHOT_NAME_BYTES];
 	uint32_t size[2];
-	int is_smooth;
+	enum psr_smooth smooth;
 	unsigned n_passes;
 	struct psr_scene scene; /* of instances and lights below: the shot must stay where it is */
 	struct psr_instance instance[SHOT_MAX_INSTANCES];

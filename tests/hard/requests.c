@@ -125,7 +125,7 @@ static void the_ends_of_all_ranges_are_drawn_or_refused(void **state)
 		request_make(&r, model[i % 3]);
 		r.scene.camera.kind = (enum psr_camera_kind)random_below(&seed, 2);
 		r.light.kind = (enum psr_light_kind)random_below(&seed, 3);
-		r.settings.is_smooth = (int)random_below(&seed, 2);
+		r.settings.smooth = (int)random_below(&seed, 2);
 		r.settings.pass = random_below(&seed, 8) ? 0 : random_below(&seed, 3);
 		for (uint32_t n = 1 + random_below(&seed, 3); n > 0; n--) {
 			const struct field *field = &fields[random_below(&seed, N_FIELDS)];

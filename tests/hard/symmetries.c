@@ -154,7 +154,7 @@ static void a_scene_scaled_by_a_power_of_two_is_the_same_picture(void **state)
 		w.scene.camera.near_z = i % 2 ? 0.3 : 0;
 		hard_draw(&plain, &w.scene, WIDTH, HEIGHT);
 		psr_settings_default(&settings, 100, 70);
-		settings.is_smooth = 1;
+		settings.smooth = 1;
 		settings.pass = (unsigned)i % 3;
 		hard_draw_pass(&still, &w.scene, &settings);
 		for (size_t n = 0; n < sizeof by / sizeof by[0]; n++) {

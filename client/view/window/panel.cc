@@ -66,7 +66,7 @@ static void draw_picture_lines(const struct viewer *viewer, const struct link_pi
 	            (double)(picture->came_ns - picture->asked_ns) * 1e-6, (double)picture->decode_ns * 1e-6,
 	            viewer->shown.take_ms, viewer->shown.warp.ms);
 	ImGui::Text("%ux%u / %u   spacing %g%s   %s   %.1f kB   error %.2f px", picture->frame.width,
-	            picture->frame.height, settings->scale, settings->spacing_px, settings->is_smooth ? "   smooth" : "",
+	            picture->frame.height, settings->scale, settings->spacing_px, settings->smooth ? "   smooth" : "",
 	            codec, (double)picture->bytes * 1e-3, picture->end.error_px);
 	draw_stages(&picture->end);
 	if (viewer->shown.is_exact)

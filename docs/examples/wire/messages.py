@@ -18,9 +18,9 @@ MESSAGES = {
     "LIST": (16, ""),
     "LIST_ENTRY": (17, "state:B 7x file_bytes:Q content_id:16s name:string"),
     "LIST_END": (18, "n_entries:I"),
-    "OPEN": (19, "resolution:I name:string"),
+    "OPEN": (19, "resolution:H levels:B 1x name:string"),
     "PROGRESS": (20, "stage:H 6x done:Q total:Q"),
-    "OPENED": (21, "handle:I representations:I content_id:16s box_min:3d box_max:3d origin:3d scale:d spacing:d "
+    "OPENED": (21, "handle:I representations:H octree_levels:B of_levels:B content_id:16s box_min:3d box_max:3d origin:3d scale:d spacing:d "
                    "resolution:I n_levels:I n_samples:Q n_blocks:Q bytes:Q up:3d"),
     "SCENE": (32, "slot:H flags:H n_instances:H n_lights:H ambient:d background:3B 5x"),  # INSTANCEs and LIGHTs follow
     "FRAME": (33, f"slot:H pass_limit:H {FORMAT} budget:B flags:H time_budget_us:Q error_bound:d {SETTINGS} "
@@ -34,7 +34,7 @@ MESSAGES = {
     "ACK": (39, "pass_:H 2x"),
 }
 NAMES = {number: name for name, (number, _) in MESSAGES.items()}
-INSTANCE = "handle:I representation:B 3x rotation:4d translation:3d scale:d"
+INSTANCE = "handle:I representation:B color_by:B 2x rotation:4d translation:3d scale:d"
 LIGHT = "kind:B flags:B color:3B 3x intensity:d position:3d direction:3d inner:d outer:d reference:d"
 ENTRY_BYTES = 18
 

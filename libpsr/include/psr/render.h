@@ -16,15 +16,19 @@ extern "C" {
 
 #define PSR_MAX_PASS 4
 
+/* FINE: draws 2x2 sub-pixels a pixel, each as EDGES would draw it in a picture of twice the size, and gives each pixel the
+ * mean of their light and the least of their depths. Takes five times as long, and draws colour and depth only. */
+enum psr_smooth { PSR_SMOOTH_NONE = 0, PSR_SMOOTH_EDGES = 1, PSR_SMOOTH_FINE = 2 };
+
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
 	/* The greatest distance between neighbouring samples, in pixels: the renderer draws the coarsest level that
 	 * keeps it, or else the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
 	double spacing_px;
-	/* 1: anti-aliasing in one pass ([G] 9.1.1), for a third of the frame's time. Blends a pixel at an edge with the
+	/* EDGES: anti-aliasing in one pass ([G] 9.1.1), for a third of the frame's time. Blends a pixel at an edge with the
 	 * surface behind it, by how many of its eight neighbours belong to the near surface, and any other pixel with
-	 * neighbours of its own surface. Only colour changes. 0 by default; passes above 0 ignore it. */
-	int is_smooth;
+	 * neighbours of its own surface. Only colour changes. NONE by default; passes above 0 ignore it. */
+	enum psr_smooth smooth;
 	/* Pass p > 0 draws 2^p x 2^p sub-pixels a pixel, and gives each pixel the mean of their light and the least of
 	 * their depths. It draws colour and depth only, takes about 4^p times as long, and needs no other pass before
 	 * it. 0..PSR_MAX_PASS; 0 by default. */
@@ -42,7 +46,7 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 /* Draws the planes of the frame that are not NULL. The caller owns them (psr_frame_alloc()); their size must be that of
  * the settings. pool NULL: draws in the caller's thread alone. Fills frame->report with times and counts; in passes
  * above 0 these count sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for
- * planes other than colour and depth in passes above 0. A failure leaves the planes undefined, and has no effect on the
+ * planes other than colour and depth in passes above 0 and fine pictures. A failure leaves the planes undefined, and has no effect on the
  * renderer's next frame. */
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);

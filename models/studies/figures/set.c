@@ -74,7 +74,7 @@ static int draw_twice(struct psr_frame *frame, struct study *study, const struct
 
 static void make_smooth(struct figure_shot *shot)
 {
-	shot->settings.is_smooth = 1;
+	shot->settings.smooth = 1;
 }
 
 /* The last pass but one of a still. */

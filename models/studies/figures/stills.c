@@ -21,7 +21,7 @@ static int show_pass(struct still *still, unsigned pass, int is_smooth)
 	struct figure_score score = { .n_met = 0 };
 	double least = INFINITY;
 
-	still->shot.settings.is_smooth = is_smooth;
+	still->shot.settings.smooth = is_smooth;
 	still->shot.settings.pass = pass;
 	for (int trial = 0; trial < TRIALS; trial++) {
 		const uint64_t start = clock_ns();

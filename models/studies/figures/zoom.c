@@ -85,7 +85,7 @@ static int draw_frame(struct study *study, struct zoom *zoom, int i)
 
 	figure_shot_init(&shot, &zoom->model, figure_view[0], magnification_of(i), SIDE);
 	for (int way = 0; rc == PSR_OK && way < 2; way++) {
-		shot.settings.is_smooth = way;
+		shot.settings.smooth = way;
 		rc = figure_draw(&zoom->frame[way][i & 1], study, &shot);
 	}
 	return rc == PSR_OK ? figure_truth_draw(&zoom->truth[i & 1], study, &zoom->model, &shot, RAYS) : rc;

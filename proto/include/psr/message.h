@@ -55,6 +55,7 @@ enum psr_cap {
 	PSR_CAP_BOUND = 1 << 24,       /* the plane of bounds */
 	PSR_CAP_LEVELS = 1 << 25,      /* OPEN of the first levels of a packed octree */
 	PSR_CAP_COLOR_BY = 1 << 26,    /* instances in other colours than their own */
+	PSR_CAP_FINE = 1 << 28,        /* settings of smooth 2 */
 };
 
 /* ---- the session ---- */
@@ -199,8 +200,8 @@ enum psr_wire_budget {
 
 struct psr_msg_settings { /* resolved settings: with them a frame is a pure function of models and request */
 	uint8_t scale;       /* drawn at 1/scale of the size in each direction and enlarged: 1, 2 or 4 */
-	uint8_t is_smooth;   /* 1: blends edges with the surface behind, and pixels with others of their surface; else
-	                      * 0 */
+	uint8_t smooth;      /* 1: blends edges with the surface behind, and pixels with others of their surface; 2
+	                      * (PSR_CAP_FINE), fine: draws so at twice the size, and takes means; else 0 */
 	uint8_t pass;        /* level of refinement that frame 0 has at once, 0..4; above 0 for servers that offer a budget
 	                      * of time or error */
 	double spacing_px;   /* greatest distance of neighbouring samples, pixels; 1 is [G]'s adequate sampling;

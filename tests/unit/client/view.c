@@ -446,7 +446,7 @@ static void a_first_frame_that_is_sharp_is_refined_at_once(void **state)
 	frame.flags |= PSR_WIRE_FRAME_SHARP;
 	frame.pass_limit = 2;
 	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
-	frame.settings = (struct psr_msg_settings){ .scale = 1, .is_smooth = 1, .spacing_px = 1 };
+	frame.settings = (struct psr_msg_settings){ .scale = 1, .smooth = 1, .spacing_px = 1 };
 	frame.color_codec = PSR_CODEC_ZSTD;
 	frame.color_quality = 0;
 	take_levels(&frame, (const uint16_t[]){ 0, 1, 2 }, 3);

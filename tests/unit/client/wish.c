@@ -276,15 +276,15 @@ static void what_is_said_wins_over_the_quality(void **state)
 	struct psr_error err;
 
 	(void)state;
-	quality_wish_init(&wish, 8, 8, "lossless");
+	quality_wish_init(&wish, 8, 8, "good", "lossless");
 	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
-	assert_true(frame.settings.is_smooth == 1 && frame.settings.spacing_px == 1 && frame.pass_limit == 0);
+	assert_true(frame.settings.smooth == 1 && frame.settings.spacing_px == 1 && frame.pass_limit == 0);
 	wish.name = "draft";
 	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
-	assert_true(frame.settings.is_smooth == 0 && frame.settings.spacing_px == 2);
+	assert_true(frame.settings.smooth == 0 && frame.settings.spacing_px == 2);
 	wish.is_smooth = 1;
 	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
-	assert_true(frame.settings.is_smooth == 1 && frame.settings.spacing_px == 2);
+	assert_true(frame.settings.smooth == 1 && frame.settings.spacing_px == 2);
 	wish.name = "best";
 	wish.has_passes = 1;
 	wish.passes = 1;
@@ -307,7 +307,7 @@ static void a_budget_is_a_time_an_error_or_a_likeness_and_says_all_detail(void *
 	char text[QUALITY_BUDGET_TEXT];
 
 	(void)state;
-	quality_wish_init(&wish, 8, 8, "lossless");
+	quality_wish_init(&wish, 8, 8, "good", "lossless");
 	assert_false(quality_is_said(&wish));
 	wish.budget = "12.5ms";
 	assert_true(quality_is_said(&wish));

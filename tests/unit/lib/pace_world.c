@@ -118,7 +118,7 @@ static double draw_ms(const struct pace_request *asked)
 {
 	const unsigned scale = asked->settings.scale;
 
-	return sim.world->draw_ms * (asked->settings.is_smooth ? 1 : WORLD_NO_SMOOTH) / (scale * scale);
+	return sim.world->draw_ms * (asked->settings.smooth ? 1 : WORLD_NO_SMOOTH) / (scale * scale);
 }
 
 /* The scene is another one every 40 cameras, two thirds of a second. */

@@ -153,7 +153,7 @@ static void make_frame(struct psr_msg_frame *m)
 		m->error_bound = 1e-3 + unit();
 	if (m->budget == PSR_WIRE_BUDGET_SETTINGS) {
 		m->settings.scale = (uint8_t)(1u << below(3));
-		m->settings.is_smooth = (uint8_t)below(2);
+		m->settings.smooth = (uint8_t)below(2);
 		m->settings.pass = (uint8_t)below(PSR_WIRE_MAX_PASS + 1);
 		m->settings.spacing_px = 1.0 / 64 + 63 * unit();
 	}
@@ -188,7 +188,7 @@ static void make_begin(struct psr_msg_frame_begin *m)
 	m->base = f.base;
 	m->base_pass = f.base ? (uint16_t)below(9) : 0;
 	m->settings.scale = 4;
-	m->settings.is_smooth = 1;
+	m->settings.smooth = 1;
 	m->settings.pass = 4;
 	m->settings.spacing_px = 64;
 	m->camera = f.camera;

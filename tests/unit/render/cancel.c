@@ -155,7 +155,7 @@ static void shots_make(struct shot shot[N_SHOTS], const struct psr_model *model,
 			                           .ambient = { 0.1, 0.1, 0.1 }, .background = { 0.1, 0.2, 0.3 } };
 		psr_camera_frame(&s->scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
 		psr_settings_default(&s->settings, width, height);
-		s->settings.is_smooth = i == 1;
+		s->settings.smooth = i == 1;
 	}
 }
 

@@ -111,7 +111,7 @@ static void case_make(struct case_of *c, uint32_t which)
 	camera->fov_y = random_in(&seed, 0.2, 1.5);
 	camera->ortho_height = random_in(&seed, 0.5, 4) * info->scale;
 	render_settings_default(&c->settings, 64 + random_below(&seed, 600), 64 + random_below(&seed, 500));
-	c->settings.is_smooth = which % 4 == 1;
+	c->settings.smooth = which % 4 == 1;
 }
 
 struct drawn {

@@ -121,7 +121,7 @@ static void draw(struct drawn *d, int is_smooth, struct psr_pool *pool)
 {
 	struct psr_renderer *renderer;
 	struct psr_error err;
-	d->settings.is_smooth = is_smooth;
+	d->settings.smooth = is_smooth;
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	if (renderer_draw(renderer, &d->scene, &d->settings, pool, &d->frame, &err))
 		fail_msg("%s", err.text);

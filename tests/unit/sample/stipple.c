@@ -131,7 +131,7 @@ static void draw(struct picture *picture, const struct psr_model *model, const s
 	scene.camera = (struct psr_camera){ .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = SIDE * pixel,
 		                                .eye = { 0, 0, 4 }, .up = { 0, 1, 0 } };
 	render_settings_default(&settings, SIDE, SIDE);
-	settings.is_smooth = shot->is_smooth;
+	settings.smooth = shot->is_smooth;
 	settings.pass = shot->pass;
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	assert_int_equal(refiner_create(&refiner, renderer, NULL), PSR_OK);

@@ -121,7 +121,7 @@ static uint64_t renderer_bytes(uint32_t width, uint32_t height, unsigned pass, u
 			                                 .scale = 4 };
 	psr_settings_default(&settings, width, height);
 	settings.pass = pass;
-	settings.is_smooth = 1;
+	settings.smooth = 1;
 	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	assert_int_equal(psr_frame_alloc(&frame, width, height, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, NULL), PSR_OK);

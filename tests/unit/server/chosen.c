@@ -107,7 +107,7 @@ static struct psr_msg_frame ask_rmse(double codes)
 static void expect_same(const struct psr_msg_settings *a, const struct psr_msg_settings *b)
 {
 	assert_int_equal(a->scale, b->scale);
-	assert_int_equal(a->is_smooth, b->is_smooth);
+	assert_int_equal(a->smooth, b->smooth);
 	assert_int_equal(a->pass, b->pass);
 	assert_true(a->spacing_px == b->spacing_px);
 }
@@ -239,7 +239,7 @@ static int rung_of(const struct psr_msg_settings *settings)
 	int r = 0;
 
 	while (psr_ladder[r].scale != settings->scale || psr_ladder[r].pass != settings->pass
-	       || psr_ladder[r].is_smooth != settings->is_smooth || psr_ladder[r].spacing_px != settings->spacing_px)
+	       || psr_ladder[r].smooth != settings->smooth || psr_ladder[r].spacing_px != settings->spacing_px)
 		assert_true(++r < PSR_RUNGS);
 	return r;
 }

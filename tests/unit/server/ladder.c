@@ -62,7 +62,7 @@ static void draw(struct budget_spent *spent, struct machine *m, const struct bud
 	spent->n_covered = AREA * density(s) * density(s);
 	spent->ns[s->pass > 0 ? BUDGET_SPLATS : BUDGET_SAMPLES] = factor * m->sample * samples_of(s);
 	spent->ns[s->pass > 0 ? BUDGET_SUBPIXELS : BUDGET_PIXELS] = factor * m->pixel * drawn;
-	spent->ns[BUDGET_SMOOTH] = s->is_smooth && s->pass == 0 ? factor * m->smooth * drawn : 0;
+	spent->ns[BUDGET_SMOOTH] = s->smooth && s->pass == 0 ? factor * m->smooth * drawn : 0;
 	for (int i = 0; i < BUDGET_N_WORK; i++)
 		spent->total_ns += spent->ns[i];
 	spent->total_ns += factor * m->answer * n / (s->scale * s->scale);
@@ -128,8 +128,8 @@ static void frames_of_all_budgets_stay_within_their_time(void **state)
 static void a_budget_that_a_setting_meets_is_used(void **state)
 {
 	static const struct psr_msg_settings rungs[] = {
-		{ .scale = 2, .spacing_px = 1 }, { .scale = 1, .spacing_px = 1, .is_smooth = 1 },
-		{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 2 },
+		{ .scale = 2, .spacing_px = 1 }, { .scale = 1, .spacing_px = 1, .smooth = 1 },
+		{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 2 },
 	};
 
 	(void)state;
@@ -281,10 +281,10 @@ static void only_settings_that_the_picture_takes_are_chosen(void **state)
 	assert_true(choice.chosen.settings.scale == 1 && choice.chosen.settings.spacing_px == 2);
 	view.planes = 1 << PSR_PLANE_COLOR | 1 << PSR_PLANE_ID; /* not refined */
 	budget_choose_time(&choice, &learnt, &view, INFINITY);
-	assert_true(choice.chosen.settings.pass == 0 && choice.chosen.settings.is_smooth);
+	assert_true(choice.chosen.settings.pass == 0 && choice.chosen.settings.smooth);
 	view.planes = 1 << PSR_PLANE_ID;
 	budget_choose_time(&choice, &learnt, &view, INFINITY);
-	assert_true(choice.chosen.settings.scale == 1 && !choice.chosen.settings.is_smooth);
+	assert_true(choice.chosen.settings.scale == 1 && !choice.chosen.settings.smooth);
 }
 
 /* The bound of a rung is that of its last frame; coarse models have the same one whatever is drawn. */
@@ -348,7 +348,7 @@ static void the_ladder_is_that_of_calibrations(void **state)
 		const struct psr_msg_settings *a = &budget_ladder[i];
 		const struct psr_rung *b = &psr_ladder[i];
 
-		assert_true(a->scale == b->scale && a->is_smooth == b->is_smooth && a->pass == b->pass);
+		assert_true(a->scale == b->scale && a->smooth == b->smooth && a->pass == b->pass);
 		assert_true(a->spacing_px == b->spacing_px);
 	}
 }

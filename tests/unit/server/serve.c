@@ -230,10 +230,10 @@ static void settings_are_kept_and_returned(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
-	frame.settings = (struct psr_msg_settings){ .scale = 1, .is_smooth = 1, .spacing_px = 2.5 };
+	frame.settings = (struct psr_msg_settings){ .scale = 1, .smooth = 1, .spacing_px = 2.5 };
 	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
 	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
-	assert_true(begin.settings.scale == 1 && begin.settings.is_smooth && begin.settings.spacing_px == 2.5);
+	assert_true(begin.settings.scale == 1 && begin.settings.smooth && begin.settings.spacing_px == 2.5);
 	do
 		assert_true(peer_next(&p, &message));
 	while (message.type != PSR_MSG_FRAME_END);

@@ -265,7 +265,7 @@ static void a_view_at_rest_gets_sharp_then_refined(void **state)
 	acknowledge(&event);
 	event = next_frame(id, 1);
 	assert_int_equal(event.begin->refine, 0);
-	assert_true(event.begin->settings.scale == 1 && event.begin->settings.is_smooth);
+	assert_true(event.begin->settings.scale == 1 && event.begin->settings.smooth);
 	assert_int_equal(event.begin->color_codec, PSR_CODEC_ZSTD);
 	assert_int_equal(event.end->is_final, 0);
 	smooth = frame;
@@ -275,7 +275,7 @@ static void a_view_at_rest_gets_sharp_then_refined(void **state)
 	smooth.settings = event.begin->settings;
 	refined = next_frame(id, 2);
 	assert_int_equal(refined.begin->refine, 1);
-	assert_true(refined.begin->settings.scale == 1 && refined.begin->settings.is_smooth);
+	assert_true(refined.begin->settings.scale == 1 && refined.begin->settings.smooth);
 	assert_int_equal(refined.begin->color_codec, PSR_CODEC_ZSTD);
 	assert_int_equal(refined.end->is_final, 1);
 	assert_as_in_view_0(event.picture, &smooth);
