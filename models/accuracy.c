@@ -24,6 +24,7 @@ struct frame {
 	const char *depth, *color, *report;
 	struct psr_camera camera;
 	double fov, spacing, spacing_px;
+	int is_fine;
 	uint32_t width, height; /* 0: as the depth has it */
 	struct {
 		int eye, target, up, fov, ortho, spacing;
@@ -99,7 +100,7 @@ static int measure(struct accuracy_result *result, const char *source, const str
 	if (code == PSR_OK)
 		result->verdict = accuracy_judge(result->text, &result->depth, bounds,
 		                                 &(struct accuracy_frame){ camera, shot.width, shot.height, depth,
-		                                                           frame->spacing, frame->spacing_px });
+		                                                           frame->spacing, frame->spacing_px, frame->is_fine });
 	psr_truth_destroy(shot.truth);
 	psr_mesh_destroy(mesh);
 	free(depth);
@@ -133,6 +134,7 @@ static int take_report(struct frame *frame, struct psr_error *err)
 	if (!frame->given.spacing)
 		frame->spacing = report.spacing;
 	frame->spacing_px = report.spacing_px;
+	frame->is_fine = report.is_fine;
 	frame->width = report.width;
 	frame->height = report.height;
 	return PSR_OK;

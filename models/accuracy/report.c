@@ -84,6 +84,7 @@ int accuracy_report_read(struct accuracy_report *out, const char *path, struct p
 	out->width = (uint32_t)size[0];
 	out->height = (uint32_t)size[1];
 	out->is_smooth = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(report, "smooth"));
+	out->is_fine = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(report, "fine"));
 	cJSON_Delete(report);
 	return code;
 }

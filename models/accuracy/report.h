@@ -11,7 +11,7 @@ struct accuracy_report {
 	double spacing;        /* of the model's samples, units of the source file */
 	double spacing_px;     /* that the frame asked for */
 	uint32_t width, height;
-	int is_smooth;
+	int is_smooth, is_fine;
 };
 
 /* Reads a report. NOT_FOUND, IO; FORMAT: it is not a report; UNSUPPORTED: the picture shows several models, or one that

@@ -63,7 +63,8 @@ enum accuracy_verdict accuracy_judge(char text[ACCURACY_TEXT], const struct psr_
                                      const struct accuracy_bounds *bounds, const struct accuracy_frame *frame)
 {
 	uint64_t n_drawn;
-	double allowed = fmax(1, frame->spacing_px * find_pixel(&n_drawn, frame) / frame->spacing);
+	const double pixel = find_pixel(&n_drawn, frame) / frame->spacing;
+	const double allowed = fmax(1, frame->spacing_px * pixel) + (frame->is_fine ? M_SQRT2 / 4 * pixel : 0);
 	const struct limits limits = {
 		.holes = bounds->has_holes ? bounds->holes : PART,
 		.distance = bounds->has_distance ? bounds->distance : allowed,

@@ -30,7 +30,7 @@ check "as psr does" cmp "$work/list" <(psr list --server "$server" | awk 'NR > 1
 pictures() { # model
 	local camera model=$1
 	read -ra camera < <(verify camera "$address" "$1" $size 2>/dev/null | tr '\n' ' ')
-	shot() { psr shot --server "$server" --model "$model" --size $size "${camera[@]}" "$@" 2>/dev/null; }
+	shot() { psr shot --quality good --server "$server" --model "$model" --size $size "${camera[@]}" "$@" 2>/dev/null; }
 	check "$model is drawn" client "$model" "$work/still.png"
 	cp "$work/out" "$work/hashes"
 	check "with the hashes of psr's picture" \

@@ -70,7 +70,13 @@ is "and is the same as a shadow of each light" "$(hashes --model wheel --light d
 	"$(hashes --model wheel --light dir:1,-1,0 --light dir:-1,-1,0 --shadows)"
 
 # --- quality ---
-is "the default is good, and smooth" "$one" "$(hashes --model teapot --quality good --smooth)"
+is "the default is fine" "$one" "$(hashes --model teapot --quality fine)"
+check "good is another picture" [ "$(hashes --model teapot --quality good)" != "$one" ]
+is "and smooth" "$(hashes --model teapot --smooth)" "$(hashes --model teapot --quality good)"
+is "planes that no fine picture has take a good one" "$(hashes --model teapot --quality good --plane normal)" \
+	"$(hashes --model teapot --plane normal)"
+refuses "unless somebody asks for a fine one" 4 "refines colour and depth" \
+	shot --model teapot --quality fine --plane normal --hash
 check "--no-smooth is another picture" [ "$(hashes --model teapot --no-smooth)" != "$one" ]
 is "draft is a spacing of 2, not smooth" "$(hashes --model teapot --spacing 2 --no-smooth)" "$(hashes --model teapot --quality draft)"
 is "best is three passes" "$(hashes --model teapot --passes 3)" "$(hashes --model teapot --quality best)"

@@ -103,7 +103,7 @@ check "and all pictures" test "$(images)" -eq $((5 * 6 + 8 + 5))
 check "no part of it is elsewhere" sh -c '! grep -qE "(src|href)=\"[^d]|url\(|@import|<script|<link" "$1"' sh "$page"
 start_psrd --models "$golden"
 check "psr shot draws a picture" \
-	psr shot --server "$server" --model teapot --size 160x120 --azimuth 22 -o "$work/shot.png"
+	psr shot --server "$server" --model teapot --size 160x120 --quality good --azimuth 22 -o "$work/shot.png"
 grep -o 'base64,[^"]*' "$page" | head -n 1 | cut -c 8- | base64 -d >"$work/first.png"
 check "the page shows the same bytes" cmp "$work/shot.png" "$work/first.png"
 check "the XML is whole and counts the same" python3 -c '

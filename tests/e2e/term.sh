@@ -41,17 +41,17 @@ says "a turn by keys, a wheel, a drag without inertia, a side, another size of t
 	keys:\x1b[<0;30;10M\x1b[<32;33;11M\x1b[<0;33;11m wait:sharp keys:3 wait:sharp picture:$work/kitty.ppm
 	size:40x11:320x176 wait:sharp picture:$work/small.ppm keys:q" "${view[@]}" --pixels kitty
 check "the terminal is as before" grep -q '^restored' "$work/said"
-psr shot --server "$server" --model teapot --view left --size 480x320 -o "$work/shot.ppm" 2>/dev/null
+psr shot --quality good --server "$server" --model teapot --view left --size 480x320 -o "$work/shot.ppm" 2>/dev/null
 check "kitty's picture has the same pixels as psr shot's" cmp "$work/kitty.ppm" "$work/shot.ppm"
 is_size() { [ "$(head -n 2 "$1" | tail -n 1)" = "$2" ]; }
 check "and the new size" is_size "$work/small.ppm" "320 160"
 says "sixels are drawn, as the terminal says that it has them; SIGTERM ends it" "^exit 0" terminal 40x13 320x208 \
 	"wait:sharp picture:$work/sixel.ppm signal:SIGTERM" "${view[@]}" --view left
 check "the terminal is as before, too" grep -q '^restored' "$work/said"
-psr shot --server "$server" --model teapot --view left --size 320x192 -o "$work/shot.ppm" 2>/dev/null
+psr shot --quality good --server "$server" --model teapot --view left --size 320x192 -o "$work/shot.ppm" 2>/dev/null
 check "they are near to psr shot's" is_near "$work/sixel.ppm" "$work/shot.ppm"
 is_far() { ! is_near "$@"; }
-psr shot --server "$server" --model teapot --view right --size 320x192 -o "$work/other.ppm" 2>/dev/null
+psr shot --quality good --server "$server" --model teapot --view right --size 320x192 -o "$work/other.ppm" 2>/dev/null
 check "and not to another side's" is_far "$work/sixel.ppm" "$work/other.ppm"
 says "symbols are drawn; a crash ends as one" "^exit -11" terminal 40x13 0x0 "wait:sharp signal:SIGSEGV" "${view[@]}" \
 	--pixels symbols

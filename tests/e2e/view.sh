@@ -71,7 +71,7 @@ shot
 check "all back is the first picture" [ "${command% -o *}" = "${home% -o *}" ]
 
 # --- pick and measure ---
-psr shot --server "$address" --model teapot --size 320x240 --depth "$work/depth.pfm" 2>/dev/null
+psr shot --server "$address" --model teapot --quality good --size 320x240 --depth "$work/depth.pfm" 2>/dev/null
 depth=$(tail -c $((4 * 320 * 240)) "$work/depth.pfm" | od -An -v -tf4 -w$((4 * 320)) | tail -n +$((240 - 120)) |
 	head -n 1 | awk '{ print $(160 + 1) }') # rows from the bottom
 xdotool mousemove --window "$window" 160 120 click 1
