@@ -19,7 +19,7 @@ from wire import messages
 from wire.picture import Picture, plane_hash
 
 FALLBACK = ("state", "stage", "reason", "status")  # fields whose unknown values `later` messages show as their fallback
-OTHER_NAMES = {"pass": "pass_", "is_final": "final", "settings_is_smooth": "settings_smooth"}
+OTHER_NAMES = {"pass": "pass_", "is_final": "final"}
 
 
 def vectors(path):

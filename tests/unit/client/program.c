@@ -579,7 +579,7 @@ static void failures_have_their_exit_status_and_leave_no_file(void **state)
 		{ "shot --instance rotten,at=1,2,3 -o x.png", 4, "face 7" },
 		{ "shot --model cube --instance cube,at=1,2,3 -o x.png", 5, "there are 2 instances; the server takes 1" },
 		{ "shot --model cube -o x.png --passes 5", 2, "--passes: '5' is out of range; it takes 0 to 4" },
-		{ "shot --model cube -o x.png --quality fine", 2, "draft, good or best, not 'fine'" },
+		{ "shot --model cube -o x.png --quality finest", 2, "draft, good, fine or best, not 'finest'" },
 		{ "shot --model cube -o x.png --smooth --no-smooth", 2, "exclude each other" },
 		{ "shot --model cube -o x.png --sheet 0x2", 2, "no place" },
 		{ "shot --model cube --sheet 2x2 --hash", 2, "-o FILE says where" },

@@ -294,7 +294,7 @@ static void what_is_said_wins_over_the_quality(void **state)
 	assert_int_equal(quality_apply(&frame, &wish, &err), PSR_ERR_ARG);
 	wish.name = "worst";
 	assert_int_equal(quality_apply(&frame, &wish, &err), PSR_ERR_ARG);
-	assert_non_null(strstr(err.text, "draft, good or best, not 'worst'"));
+	assert_non_null(strstr(err.text, "draft, good, fine or best, not 'worst'"));
 }
 
 static void a_budget_is_a_time_an_error_or_a_likeness_and_says_all_detail(void **state)

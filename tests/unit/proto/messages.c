@@ -153,7 +153,7 @@ static void make_frame(struct psr_msg_frame *m)
 		m->error_bound = 1e-3 + unit();
 	if (m->budget == PSR_WIRE_BUDGET_SETTINGS) {
 		m->settings.scale = (uint8_t)(1u << below(3));
-		m->settings.smooth = (uint8_t)below(2);
+		m->settings.smooth = (uint8_t)below(3);
 		m->settings.pass = (uint8_t)below(PSR_WIRE_MAX_PASS + 1);
 		m->settings.spacing_px = 1.0 / 64 + 63 * unit();
 	}

@@ -45,7 +45,8 @@ static void welcome_tells_the_limits(void **state)
 	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
 	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
 	                                           PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND | PSR_CAP_RMSE_BOUND |
-	                                           PSR_CAP_BOUND | PSR_CAP_FETCH);
+	                                           PSR_CAP_BOUND | PSR_CAP_FETCH | PSR_CAP_LEVELS | PSR_CAP_COLOR_BY |
+	                                           PSR_CAP_FINE);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -143,17 +144,18 @@ static void the_report_has_every_entry_in_order(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	assert_int_equal(end.n_entries, 23 + PSR_N_EFFECTS);
+	assert_int_equal(end.n_entries, 24 + PSR_N_EFFECTS);
 	for (int i = 0; i < 13; i++)
 		assert_int_equal(end.entry[i].id, i + 1);
 	assert_true(end.entry[12].ns > 0); /* cores' time */
 	for (int i = 13; i < 23; i++)
 		assert_int_equal(end.entry[i].id, i - 13 + 32);
-	for (int i = 23; i < 23 + PSR_N_EFFECTS; i++) {
-		assert_int_equal(end.entry[i].id, i - 23 + PSR_WIRE_REPORT_EFFECTS);
+	assert_int_equal(end.entry[23].id, PSR_WIRE_REPORT_AS_BLOCKS);
+	for (int i = 24; i < 24 + PSR_N_EFFECTS; i++) {
+		assert_int_equal(end.entry[i].id, i - 24 + PSR_WIRE_REPORT_EFFECTS);
 		assert_true(end.entry[i].ns == PSR_WHY_RAN || end.entry[i].count == 0);
 	}
-	assert_int_equal(end.entry[23 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
+	assert_int_equal(end.entry[24 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
 	assert_int_equal(end.entry[9].count, 2);
 	assert_int_equal(end.entry[18].count, PLATE_SAMPLES);
 	peer_close(&p);
@@ -241,6 +243,33 @@ static void settings_are_kept_and_returned(void **state)
 	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
 	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
 	assert_int_equal(begin.settings.scale, 2);
+	peer_close(&p);
+}
+
+static void fine_pictures_have_colors_and_depths_and_no_passes(void **state)
+{
+	struct psr_msg_frame frame = frame_default(64, 48);
+	struct psr_msg_frame_begin begin;
+	struct psr_message message;
+	char text[PSR_ERROR_TEXT];
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
+	frame.settings = (struct psr_msg_settings){ .scale = 1, .smooth = 2, .spacing_px = 1 };
+	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
+	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
+	assert_int_equal(begin.settings.smooth, 2);
+	do
+		assert_true(peer_next(&p, &message));
+	while (message.type != PSR_MSG_FRAME_END);
+	frame.planes |= 1 << PSR_PLANE_NORMAL;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
+	assert_non_null(strstr(text, "other planes take"));
+	frame.planes = 1 << PSR_PLANE_COLOR;
+	frame.pass_limit = 1;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
+	assert_non_null(strstr(text, "a fine picture"));
 	peer_close(&p);
 }
 
@@ -720,6 +749,7 @@ int main(void)
 		cmocka_unit_test(the_report_has_every_entry_in_order),
 		cmocka_unit_test(a_light_that_casts_shadows_gets_a_map),
 		cmocka_unit_test(settings_are_kept_and_returned),
+		cmocka_unit_test(fine_pictures_have_colors_and_depths_and_no_passes),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
 		cmocka_unit_test(a_cancel_keeps_the_view_of_its_id),
