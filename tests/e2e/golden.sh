@@ -3,7 +3,7 @@
 # The golden frames through psrd, with all instructions that the machine has, by one thread and by two: what
 # tests/golden/frames draws without sockets.
 . "$(dirname "$0")/lib.sh"
-suites="tests/golden/frames.suite tests/golden/octrees.suite"
+suites="tests/golden/frames.suite tests/golden/octrees.suite tests/golden/dpoints.suite"
 n=$(cat $suites | grep -c '^test=')
 
 isas=c

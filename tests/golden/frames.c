@@ -1,5 +1,5 @@
-/* Draws the shots of tests/golden/frames.suite and octrees.suite with every instruction set that the machine has, by
- * one thread and by two: each frame has the hashes that the suite names, whatever the machine. */
+/* Draws the shots of tests/golden/frames.suite, octrees.suite and dpoints.suite with every instruction set that the
+ * machine has, by one thread and by two: each frame has the hashes that the suite names, whatever the machine. */
 #define _GNU_SOURCE
 #include <inttypes.h>
 #include <stdio.h>
@@ -117,11 +117,11 @@ static void check_shot(struct shot *shot)
 
 int main(void)
 {
-	static const char *const suite[] = { FOLDER "/frames.suite", FOLDER "/octrees.suite" };
+	static const char *const suite[] = { FOLDER "/frames.suite", FOLDER "/octrees.suite", FOLDER "/dpoints.suite" };
 	struct psr_error err;
 
 	make_ways();
-	for (int i = 0; i < 2; i++)
+	for (size_t i = 0; i < sizeof suite / sizeof *suite; i++)
 		if (shots_read(suite[i], open_model, check_shot, &err))
 			stop(suite[i], err.text);
 	printf("1..%u\n", n_shots);
