@@ -11,6 +11,7 @@ DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygl
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev liblzf-dev
 DEPS_TEST  := libcmocka-dev assimp-testmodels python3 xvfb xdotool libx11-dev weston
 DEPS_VIEW  := libsdl2-dev libimgui-dev libchafa-dev
+DEPS_CAD   := libocct-data-exchange-dev
 DEPS_STUDY := gnuplot-nox
 DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev
 DEPS_CROSS := gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user
@@ -59,7 +60,7 @@ endif
 
 INC := -I. -Ilibpsr/include -Ilibpsr -Iproto/include -Iclient/include -DPSR_VERSION='"$(VERSION)"'
 CFLAGS_ALL   = -std=gnu11 $(COMMON) $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(INC) $(ISA) $(CFLAGS) -MMD -MP
-CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(INC) $(CXXFLAGS) -MMD -MP
+CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(INC) $(ISA) $(CXXFLAGS) -MMD -MP
 
 # All cores unless told otherwise: jobs=1, or make -j.
 jobs ?= $(shell nproc)
@@ -83,6 +84,7 @@ endif
 LIBPSR_O       := $(call tree,libpsr/base libpsr/compare libpsr/dpoint libpsr/model libpsr/octree libpsr/render) $(SIMD_O)
 LIBPSR_BUILD_O := $(call tree,libpsr/import libpsr/surface libpsr/ray libpsr/sample libpsr/measure)
 IMAGE_O        := $(call tree,libpsr/image)
+CAD_O          := $(call tree,libpsr/cad)
 PROTO_O        := $(call tree,proto)
 CLIENT_LIB_O   := $(call tree,client/lib)
 PSRD_O         := $(call tree,server)
@@ -101,8 +103,14 @@ LIB := $(BUILD)/lib
 BIN := $(BUILD)/bin
 A   := $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 PROGRAMS := $(BIN)/psrd $(BIN)/psr
+OCC := /usr/include/opencascade
 ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(BIN)/psr-study $(LIB)/psr-image-oiio.so
+ifneq ($(wildcard $(OCC)/STEPCAFControl_Reader.hxx),)
+PROGRAMS += $(LIB)/psr-cad-occ.so
+else ifneq ($(filter compile,$(MAKECMDGOALS)),)
+$(info psr-cad-occ.so is left out: $(DEPS_CAD) is not there)
+endif
 endif
 ifneq ($(filter release debug asan,$(config)),)
 ifeq ($(shell pkg-config --exists sdl2 imgui 2>/dev/null && echo 1),1)
@@ -124,6 +132,8 @@ ifeq ($(config),aarch64)
 L_PSR    := -lm
 endif
 L_CODEC  := -lturbojpeg
+L_CAD    := -Wl,--as-needed -lTKernel $(addprefix -lTK,XDESTEP XDEIGES STEP IGES \
+	XSBase XCAF LCAF CAF CDF Mesh TopAlgo BRep GeomBase G3d Math)
 L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
 L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
 L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
@@ -197,6 +207,11 @@ $(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
 	@mkdir -p $(@D)
 	$(call say,LD,$@)
 	$(Q)$(CXX) $(LINK) $(LDFLAGS) -shared -o $@ $^ -lOpenImageIO -lOpenImageIO_Util
+$(BUILD)/libpsr/cad/%.o: ISA := -isystem $(OCC)
+$(LIB)/psr-cad-occ.so: $(CAD_O)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)
+	$(Q)$(CXX) $(LINK) $(LDFLAGS) -shared -o $@ $^ $(L_CAD)
 
 # --- tests ----------------------------------------------------------------------------------------------------------
 
@@ -378,6 +393,7 @@ check: $(CHECK_BIN) $(PROGRAMS) ## check: run the tests of this config without l
 test: ## test: install what is missing, build, run every test; ends in "N passed, N failed, N skipped"
 	$(Q).ci/deps $(DEPS_BUILD) $(DEPS_TEST)
 	$(Q).ci/deps $(DEPS_VIEW) || :
+	$(Q).ci/deps $(DEPS_CAD) || :
 	$(Q)$(MAKE) --no-print-directory models
 	$(Q)$(MAKE) --no-print-directory check
 
@@ -504,6 +520,7 @@ studies: deps ## studies: install what is missing, build, repeat the thesis's st
 deps:
 	@.ci/deps $(DEPS_BUILD)
 	@.ci/deps $(DEPS_VIEW) || :
+	@.ci/deps $(DEPS_CAD) || :
 
 BASH_COMPLETION := $(PREFIX)/share/bash-completion/completions
 
@@ -511,7 +528,7 @@ install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, hea
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
 	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man5
 	install $(addprefix $(BIN)/,psrd psr psr-model) $(wildcard $(BIN)/psr-view $(BIN)/psr-view-term) $(DESTDIR)$(PREFIX)/bin
-	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
+	install -m 644 $(LIB)/psr-image-oiio.so $(wildcard $(LIB)/psr-cad-occ.so) $(DESTDIR)$(PREFIX)/lib/psr
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
 	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1

@@ -34,6 +34,7 @@
 	"  PLY         meshes and clouds; text and binary\n" \
 	"  LAS         clouds of versions 1.0 to 1.4; not compressed ones (LAZ)\n" \
 	"  PCD         clouds of the Point Cloud Library; text, binary and compressed\n" \
+	"  STEP, IGES  exact surfaces of CAD, with colours and assemblies\n" \
 	"  PTS, PTX, XYZ\n" \
 	"              clouds as text, for octrees alone\n" \
 	"  the others  OBJ, STL, OFF, 3DS, Collada and other formats that Assimp reads"
@@ -60,13 +61,14 @@ static void warn(const struct psr_mesh *mesh)
 		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " points and lines were left out\n", mesh->n_dropped_primitives);
 }
 
+/* Of materials, not of the coverage of things narrower than a sample. */
 static void warn_of_sheer(const struct psr_model *model)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(model);
 	uint32_t n = 0;
 
 	for (uint32_t b = 0; b < blocks->n_blocks; b++)
-		n += psr_blocks_is_sheer(blocks, b) != 0;
+		n += psr_blocks_is_sheer(blocks, b) && (psr_blocks_traits(blocks, b) & PSR_BLOCK_THIN) == 0;
 	if (n != 0)
 		fprintf(stderr, PROGRAM ": note: %" PRIu32 " of %" PRIu32 " blocks are of surfaces that let light through (BLEND "
 		        "materials); each pixel shows the nearest eight, without refraction\n", n, blocks->n_blocks);
@@ -284,7 +286,7 @@ int cmd_build(int argc, char **argv)
 		          " for a first look, fast. An octree of points is as fine as these are.", .min = 8, .max = 8192 },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = wish.build.up, .arg = "X,Y,Z",
 		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
-		          " usual for the format, +z for LAS, PCD, STL and survey coordinates, +y for the others." },
+		          " usual for the format, +z for LAS, PCD, STL, STEP, IGES and survey coordinates, +y for the others." },
 		{ .name = "crease", .type = PSR_OPT_REAL, .value = &crease, .arg = "DEG",
 		  .help = "Edges stay sharp where faces meet at a greater angle, in files that bring no directions of shading"
 		          " (normals). Lower it where edges look rounded; raise it where a smooth surface shows facets.",
@@ -365,6 +367,7 @@ int cmd_build(int argc, char **argv)
 	wish.build.tolerance = tolerance * PSR_DEGREE;
 	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
 	wish.import.crease = crease * PSR_DEGREE;
+	wish.import.resolution = (uint32_t)resolution;
 	wish.import.is_preview = resolution <= PSR_PREVIEW_RESOLUTION;
 	wish.octree.resolution = (uint32_t)resolution;
 	wish.octree.memory = (uint64_t)memory;

@@ -11,6 +11,8 @@
 #define SURVEY_SIZES 10 /* sizes of the scene between its middle and the origin */
 #define MOST_THREADS 256
 #define DEFAULT_CREASE 0.6108652381980153 /* 35 degrees */
+#define DEFAULT_RESOLUTION 1024
+#define MOST_RESOLUTION 8192
 #define MOST_CREASE 3.1415926535897933    /* a little over pi */
 
 void psr_import_options_default(struct psr_import_options *options)
@@ -18,6 +20,7 @@ void psr_import_options_default(struct psr_import_options *options)
 	options->crease = DEFAULT_CREASE;
 	options->n_threads = psr_pool_all_cores();
 	options->is_preview = 0;
+	options->resolution = DEFAULT_RESOLUTION;
 }
 
 static int check_options(const struct psr_import_options *options, struct psr_error *err)
@@ -26,6 +29,9 @@ static int check_options(const struct psr_import_options *options, struct psr_er
 		return psr_fail(err, PSR_ERR_ARG, "a crease of %g radians is not within 0..pi", options->crease);
 	if (options->n_threads < 1 || options->n_threads > MOST_THREADS)
 		return psr_fail(err, PSR_ERR_ARG, "%d threads are not within 1..%d", options->n_threads, MOST_THREADS);
+	if (options->resolution < 8 || options->resolution > MOST_RESOLUTION)
+		return psr_fail(err, PSR_ERR_ARG, "a resolution of %u pixels is not within 8..%d", options->resolution,
+		                MOST_RESOLUTION);
 	return PSR_OK;
 }
 
@@ -83,7 +89,7 @@ static int is_surveyed(const struct psr_mesh *mesh)
 static void find_up(struct psr_mesh *mesh, const char *path, const uint8_t *bytes, size_t n_bytes)
 {
 	static const char *const endings[] = { ".stl", ".amf", ".3mf" };
-	int has_z = is_las(path, bytes, n_bytes) || is_pcd(path, bytes, n_bytes) ||
+	int has_z = is_las(path, bytes, n_bytes) || is_pcd(path, bytes, n_bytes) || import_cad_is(path, bytes, n_bytes) ||
 	             (!is_gltf(path, bytes, n_bytes) && is_surveyed(mesh));
 
 	for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
@@ -122,6 +128,8 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 		rc = import_las(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK && is_pcd(path, bytes, n_bytes))
 		rc = import_pcd(&im, bytes, n_bytes, err);
+	else if (rc == PSR_OK && import_cad_is(path, bytes, n_bytes))
+		rc = import_cad(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK)
 		rc = import_assimp(&im, bytes, n_bytes, err);
 	if (rc == PSR_OK)

@@ -1,4 +1,4 @@
-/* The import of mesh files: the mesh under construction, files and paths, images, and the five readers. import.c knows
+/* The import of mesh files: the mesh under construction, files and paths, images, and the six readers. import.c knows
  * the order of the steps.
  *
  * Readers open files that the source file names through import_path_inside alone, which refuses paths outside of the
@@ -168,6 +168,10 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_las(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_pcd(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+
+/* cad/cad.c: returns whether a file is STEP or IGES, by its first bytes or its ending. */
+int import_cad_is(const char *path, const uint8_t *bytes, size_t n_bytes);
 
 #ifdef __cplusplus
 }

@@ -45,9 +45,10 @@ static int hash_file(XXH3_state_t *state, const char *path, struct psr_error *er
 /* Files of the first formats never name other files, and the others seldom do. */
 static int is_alone(const char *source)
 {
-	static const char *const endings[] = { ".stl", ".off", ".las", ".pcd", ".pts", ".ptx", ".xyz", ".glb", ".ply" };
+	static const char *const endings[] = { ".stl", ".off", ".las", ".pcd", ".pts", ".ptx", ".xyz",
+		                                      ".step", ".stp", ".iges", ".igs", ".glb", ".ply" };
 	const char *dot = strrchr(source, '.');
-	enum { NEVER = 7 };
+	enum { NEVER = 11 };
 	struct parts parts;
 	size_t i = 0;
 

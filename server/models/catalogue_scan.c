@@ -14,8 +14,8 @@
 
 /* In order of preference. */
 static const char *const endings[] = {
-	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "las", "lwo", "obj", "off", "pcd", "ply", "pts", "ptx",
-	"stl", "x", "xyz",
+	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "iges", "igs", "las", "lwo", "obj", "off", "pcd", "ply",
+	"pts", "ptx", "step", "stl", "stp", "x", "xyz",
 };
 #define N_ENDINGS (sizeof endings / sizeof endings[0])
 

@@ -15,9 +15,7 @@ static const struct {
 	  "psr reads no points in this format; save it as LAS or PLY in CloudCompare, or with \"pdal translate\"" },
 	{ ".rcp .rcs .fls .fws .lsproj .zfs ",
 	  "psr reads no project of a scanner's own program; export it from there as LAS, or as PLY" },
-	{ ".step .stp .iges .igs .brep ",
-	  "psr reads no exact CAD surfaces, only triangles; convert it with \"gmsh -2 IN.step -o OUT.stl\", or export it as "
-	  "glTF or STL from FreeCAD" },
+	{ ".brep ", "psr reads no surfaces in Open CASCADE's own format; export it as STEP from FreeCAD" },
 	{ ".fcstd .sldprt .sldasm .ipt .iam .prt .catpart .catproduct .jt .x_t .x_b .sat .f3d .3dm .skp .dwg .dxf ",
 	  "psr reads no drawings of CAD programs; export it as glTF, OBJ or STL from the program that made it" },
 	{ ".ifc ", "psr reads no buildings in IFC; convert it with \"IfcConvert IN.ifc OUT.glb\"" },

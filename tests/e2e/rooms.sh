@@ -20,8 +20,10 @@ libpsr/import/ply
 libpsr/import/points
 libpsr/import/gltf
 libpsr/import/assimp
+libpsr/import/cad
 libpsr/import
 libpsr/image
+libpsr/cad
 libpsr/surface
 libpsr/ray
 libpsr/measure

@@ -92,7 +92,7 @@ struct psr_mesh {
 	struct psr_material *material;  /* at least one */
 	struct psr_image *image;
 
-	double up[3]; /* unit length: +z for clouds of LAS and PCD, for STL, AMF and 3MF, and for anything else at survey
+	double up[3]; /* unit length: +z for LAS and PCD, for STL, AMF, 3MF, STEP and IGES, and for anything else at survey
 	               * coordinates (further from the origin in x or y than ten times its size); +y for the rest, glTF
 	               * always */
 
@@ -112,13 +112,16 @@ struct psr_import_options {
 	int n_threads; /* 1..256; the result does not depend on it */
 	int is_preview; /* of more than 131,072 triangles, those smaller than a 128th of the mesh's longest side are merged:
 	                 * fast, and fine enough for models of PSR_PREVIEW_RESOLUTION pixels. Thinner things may vanish */
+	uint32_t resolution; /* 8..8192: exact surfaces of STEP and IGES become triangles that are fine enough for models of so
+	                      * many pixels: they are off by an eighth of one at most */
 };
 #define PSR_PREVIEW_RESOLUTION 64
 
-void psr_import_options_default(struct psr_import_options *options); /* 35 degrees, all cores, no preview */
+void psr_import_options_default(struct psr_import_options *options); /* 35 degrees, all cores, no preview, 1024 pixels */
 
-/* Reads any supported file: .gltf and .glb through tinygltf, .ply, .las and .pcd by readers of our own, all others
- * through Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is loaded when the first
+/* Reads any supported file: .gltf and .glb through tinygltf, .ply, .las and .pcd by readers of our own, STEP and
+ * IGES through Open CASCADE, whose module psr-cad-occ.so is loaded when the first such file comes, all others through
+ * Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is loaded when the first
  * such image comes (UNSUPPORTED if it is missing). NULL options are the defaults. The mesh keeps the promises above, has at
  * least one triangle or point, and belongs to the caller (psr_mesh_destroy()). ARG, NOT_FOUND, IO, FORMAT (with the
  * place), UNSUPPORTED (names the extension), LIMIT, MEMORY. Bad input never crashes it. It throws no exception and

@@ -160,20 +160,20 @@ static void what_cannot_be_read_is_named_with_what_to_do(void **state)
 	(void)state;
 	make("scan.laz");
 	make("Tower.copc.laz");
-	make("part.STEP");
+	make("part.BREP");
 	make("statue.e57");
 	make("all.tar.gz");
 	make_folder("cad");
-	make("cad/lever.igs");
+	make("cad/lever.sldprt");
 	make("cad/drawing.png");
 	scan();
 	assert_int_equal(catalogue.n, 6);
 	expect_reason("scan", "scan.laz: psr reads no compressed LAS (LAZ); unpack it with \"laszip");
 	expect_reason("Tower", "LAZ");
-	expect_reason("part", "part.STEP: psr reads no exact CAD surfaces");
+	expect_reason("part", "part.BREP: psr reads no surfaces in Open CASCADE's own format");
 	expect_reason("statue", "pdal translate");
 	expect_reason("all", "all.tar.gz: this is an archive");
-	expect_reason("lever", "cad/lever.igs: psr reads no exact CAD surfaces");
+	expect_reason("lever", "cad/lever.sldprt: psr reads no drawings of CAD programs");
 }
 
 static void what_belongs_to_models_is_no_entry(void **state)
@@ -196,7 +196,7 @@ static void what_was_converted_is_the_model(void **state)
 	(void)state;
 	make("scan.laz");
 	make("scan.las");
-	make("part.step");
+	make("part.brep");
 	make("part.psr");
 	make_folder("engine");
 	make("engine/engine.gltf");

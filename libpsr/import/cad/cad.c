@@ -1,0 +1,164 @@
+#define _GNU_SOURCE
+#include <stdio.h>
+#include <string.h>
+#include "base/cad_module.h"
+#include "import/import.h"
+
+#define PER_PIXEL 8       /* triangles are off by this part of a pixel of the model */
+#define ANGLE 0.2         /* radians: colours and highlights between corners stay smooth */
+#define HEAD 4096
+#define TAIL 65536        /* of a file; its end is in there */
+#define CARD 80           /* bytes of a line of IGES */
+#define SECTION 72        /* of them, that come before the section's letter */
+
+static int is_step_ending(const char *path)
+{
+	return import_path_ends_with(path, ".step") || import_path_ends_with(path, ".stp");
+}
+
+static int is_iges_ending(const char *path)
+{
+	return import_path_ends_with(path, ".iges") || import_path_ends_with(path, ".igs");
+}
+
+/* Buildings in IFC have the same syntax, and other contents. */
+static int is_step(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	const size_t n = n_bytes < HEAD ? n_bytes : HEAD;
+
+	return is_step_ending(path) ||
+	       (n >= 13 && memcmp(bytes, "ISO-10303-21;", 13) == 0 && memmem(bytes, n, "'IFC", 4) == NULL);
+}
+
+static int is_iges(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	return is_iges_ending(path) ||
+	       (n_bytes > CARD && bytes[SECTION] == 'S' && memcmp(bytes + SECTION + 1, "      1", 7) == 0);
+}
+
+int import_cad_is(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	return is_step(path, bytes, n_bytes) || is_iges(path, bytes, n_bytes);
+}
+
+static int check_step(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
+{
+	const size_t tail = n_bytes < TAIL ? n_bytes : TAIL;
+
+	if (memmem(bytes, n_bytes < HEAD ? n_bytes : HEAD, "ISO-10303-21;", 13) == NULL)
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: not a STEP file: it does not begin with ISO-10303-21;", im->path);
+	if (memmem(bytes + n_bytes - tail, tail, "END-ISO-10303-21;", 17) == NULL)
+		return psr_fail(err, PSR_ERR_FORMAT,
+		                "%s: the STEP file ends in the middle: END-ISO-10303-21; is missing after %zu bytes; export it again",
+		                im->path, n_bytes);
+	return PSR_OK;
+}
+
+/* Lines of sections S, G, D and P are numbered, and the last one, T, has their numbers. */
+static int check_iges(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
+{
+	static const char letter[] = "SGDPT";
+	unsigned long long counted[5] = { 0 }, told[4];
+	char last[CARD + 1] = "";
+	size_t at = 0;
+
+	while (at + SECTION < n_bytes) {
+		const uint8_t *end = memchr(bytes + at, '\n', n_bytes - at);
+		const size_t next = end != NULL ? (size_t)(end - bytes) + 1 : n_bytes;
+		const char *section = next - at > SECTION && bytes[at + SECTION] != 0 ? strchr(letter, bytes[at + SECTION]) : NULL;
+
+		if (section == NULL)
+			break;
+		counted[section - letter]++;
+		if (*section == 'T')
+			snprintf(last, sizeof last, "%.*s", SECTION, (const char *)bytes + at);
+		at = next;
+	}
+	if (counted[0] == 0)
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: not an IGES file in lines of %d bytes: column %d of the first has no S",
+		                im->path, CARD, SECTION + 1);
+	if (counted[4] == 0)
+		return psr_fail(err, PSR_ERR_FORMAT,
+		                "%s: the IGES file ends in the middle: its last line, of section T, is missing after %zu bytes;"
+		                " export it again", im->path, n_bytes);
+	if (sscanf(last, "S%7llu G%7llu D%7llu P%7llu", &told[0], &told[1], &told[2], &told[3]) != 4)
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: the last line of the IGES file does not tell its sections' lines",
+		                im->path);
+	for (int i = 0; i < 4; i++)
+		if (told[i] != counted[i])
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: section %c of the IGES file has %llu lines, and its last line tells %llu",
+			                im->path, letter[i], counted[i], told[i]);
+	return PSR_OK;
+}
+
+static int add_materials(struct import_mesh *im, const struct cad_module_mesh *cad, struct psr_error *err)
+{
+	for (uint32_t i = 0; i < cad->n_colors; i++) {
+		struct psr_material material;
+		const float *color = cad->color[i];
+		int rc;
+
+		psr_material_default(&material);
+		material.roughness = IMPORT_ROUGHNESS;
+		material.two_sided = cad->n_open > 0; /* the insides of solids cannot be seen */
+		for (int k = 0; k < 3; k++)
+			material.base_color[k] = color[3] < 0 ? IMPORT_GRAY : color[k];
+		material.base_color[3] = color[3] < 0 ? 1 : color[3];
+		material.alpha = material.base_color[3] < 1 ? PSR_ALPHA_BLEND : PSR_ALPHA_OPAQUE;
+		rc = import_mesh_add_material(im, &material, err);
+		if (rc < 0)
+			return rc;
+	}
+	return PSR_OK;
+}
+
+static int take(struct import_mesh *im, const struct cad_module_mesh *cad, struct psr_error *err)
+{
+	const uint32_t first = im->mesh->n_materials;
+	struct psr_mesh *mesh = im->mesh;
+	int rc = add_materials(im, cad, err);
+
+	if (rc == PSR_OK)
+		rc = import_mesh_grow(im, cad->n_vertices, cad->n_triangles, 0, err);
+	if (rc != PSR_OK)
+		return rc;
+	memcpy(mesh->position, cad->position, cad->n_vertices * sizeof *cad->position);
+	memcpy(mesh->normal, cad->normal, cad->n_vertices * sizeof *cad->normal);
+	memcpy(mesh->triangle, cad->triangle, cad->n_triangles * sizeof *cad->triangle);
+	for (uint32_t t = 0; t < cad->n_triangles; t++)
+		mesh->triangle_material[t] = first + cad->color_of[t];
+	if (cad->n_left_out > 0)
+		import_mesh_warn(im, "%u of %u faces could not be cut into triangles and were left out, first face %s",
+		                 cad->n_left_out, cad->n_faces, cad->first_left_out);
+	if (cad->n_open > 0)
+		import_mesh_warn(im, "%u shells are open: their faces do not meet all around", cad->n_open);
+	rc = import_mesh_merge(im, err);
+	return rc == PSR_OK ? import_mesh_weld(im, err) : rc;
+}
+
+int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
+{
+	const struct cad_module_source source = {
+		im->path, !is_step(im->path, bytes, n_bytes), 1.0 / (PER_PIXEL * (double)im->options.resolution), ANGLE,
+		IMPORT_MAX_TRIANGLES / 4,
+	};
+	const struct cad_module *module;
+	struct cad_module_mesh *cad;
+	struct psr_error why;
+	char message[300] = "";
+	int rc = source.is_iges ? check_iges(im, bytes, n_bytes, err) : check_step(im, bytes, n_bytes, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = cad_module_open(&module, &why);
+	if (rc != PSR_OK)
+		return psr_fail(err, rc,
+		                "%s: %s; STEP and IGES are read through Open CASCADE: install libocct-data-exchange-dev and build psr"
+		                " again, or convert the file to glTF or STL", im->path, why.text);
+	rc = module->read(&cad, &source, message, sizeof message);
+	if (rc != PSR_OK)
+		return psr_fail(err, rc, "%s: the %s file cannot be read: %s", im->path, source.is_iges ? "IGES" : "STEP", message);
+	rc = take(im, cad, err);
+	module->destroy(cad);
+	return rc;
+}

@@ -1,0 +1,180 @@
+/* Two pins of an assembly, 50 mm apart: red-brown cylinders of radius 10 and height 20. */
+#define _GNU_SOURCE
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+#include <unistd.h>
+#include "base/infile.h"
+#include "import/import.h"
+#include "files.h"
+
+static int has_module; /* a build without Open CASCADE has none */
+
+static struct psr_mesh *read_pins(const char *path, uint32_t resolution)
+{
+	struct psr_import_options options;
+	struct psr_mesh *mesh = NULL;
+	struct psr_error err = { 0, "" };
+
+	psr_import_options_default(&options);
+	options.resolution = resolution;
+	if (psr_mesh_import(&mesh, path, &options, &err) != PSR_OK)
+		fail_msg("%s", err.text);
+	return mesh;
+}
+
+/* Corners are within `edge` mm of the surface, which is the tolerance of its edges, and middles of sides within an eighth of
+ * a pixel, of 70 / 256 mm. Normals are the surface's, of radius 10 mm, at a place as near to the corner, and floats. */
+static void check_pins(const char *path, double edge)
+{
+	struct psr_mesh *mesh = read_pins(path, 256);
+	double area = 0;
+
+	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
+		const double (*p)[3] = (const double (*)[3])mesh->position;
+		const uint32_t *c = mesh->triangle[t];
+		const struct psr_material *material;
+		double a[3], b[3];
+
+		for (int k = 0; k < 3; k++) {
+			a[k] = p[c[1]][k] - p[c[0]][k];
+			b[k] = p[c[2]][k] - p[c[0]][k];
+		}
+		area += sqrt(pow(a[1] * b[2] - a[2] * b[1], 2) + pow(a[2] * b[0] - a[0] * b[2], 2) +
+		             pow(a[0] * b[1] - a[1] * b[0], 2)) / 2;
+		for (int i = 0; i < 3; i++) {
+			const uint32_t v = c[i], w = c[(i + 1) % 3];
+			const double from = p[v][0] > 25 ? 50 : 0, x = p[v][0] - from, r = hypot(x, p[v][1]);
+			const double middle = hypot((x + p[w][0] - from) / 2, (p[v][1] + p[w][1]) / 2);
+			const float *n = mesh->normal[v];
+
+			assert_true(fabs(r - 10) < edge && p[v][2] > -edge && p[v][2] < 20 + edge);
+			if (fabsf(n[2]) < 0.5f) {
+				assert_true(fabs((double)n[0] - x / 10) < edge / 10 + FLT_EPSILON &&
+				            fabs((double)n[1] - p[v][1] / 10) < edge / 10 + FLT_EPSILON);
+				assert_true(middle > 10 - 70.0 / 256 / 8 - edge);
+			} else {
+				assert_true(fabsf(n[2] - (p[v][2] > 10 ? 1.0f : -1.0f)) < 1e-6f);
+			}
+		}
+		material = &mesh->material[mesh->triangle_material[t]];
+		assert_true(fabsf(material->base_color[0] - 0.5f) < 0.01f && fabsf(material->base_color[2] - 0.125f) < 0.01f);
+		assert_true(material->base_color[3] == 1 && material->alpha == PSR_ALPHA_OPAQUE);
+	}
+	/* Of polygons of at least 30 sides (0.2 radians): at most 1 - cos(pi / 30) = 0.6 % of a cylinder's side less, and 0.8 %
+	 * of its ends. */
+	assert_true(area > 2 * 600 * M_PI * 0.992 && area < 2 * 600 * M_PI);
+	assert_true(mesh->up[2] == 1);
+	psr_mesh_destroy(mesh);
+}
+
+static void step_has_places_normals_and_colors(void **state)
+{
+	(void)state;
+	if (!has_module)
+		skip();
+	check_pins("tests/data/import/pins.step", 1e-7);
+}
+
+static void iges_has_places_normals_and_colors(void **state)
+{
+	(void)state;
+	if (!has_module)
+		skip();
+	/* Open CASCADE reads the circles of cylinders as splines, and gives such an edge this tolerance. */
+	check_pins("tests/data/import/pins.iges", 1e-5);
+}
+
+/* Deflection is absolute: four times as fine takes twice the sides, once the angle does not decide any more. */
+static void a_finer_model_has_more_triangles(void **state)
+{
+	struct psr_mesh *coarse, *fine;
+
+	(void)state;
+	if (!has_module)
+		skip();
+	coarse = read_pins("tests/data/import/pins.step", 256);
+	fine = read_pins("tests/data/import/pins.step", 8192);
+	assert_true(fine->n_triangles > 2 * coarse->n_triangles);
+	psr_mesh_destroy(coarse);
+	psr_mesh_destroy(fine);
+}
+
+static void expect_end(const char *path, const char *name, const char *why)
+{
+	uint8_t *bytes = NULL;
+	size_t n = 0;
+
+	assert_int_equal(infile_read(&bytes, &n, path, 1 << 20, NULL), PSR_OK);
+	for (size_t length = 200; length + 100 < n; length += 97) {
+		write_bytes(path_of(name), bytes, length);
+		refuse(name, PSR_ERR_FORMAT, why);
+	}
+	free(bytes);
+}
+
+static void a_file_that_ends_in_the_middle_is_told(void **state)
+{
+	(void)state;
+	expect_end("tests/data/import/pins.step", "cut.step", "the STEP file ends in the middle");
+	expect_end("tests/data/import/pins.iges", "cut.igs", "the IGES file ends in the middle");
+}
+
+/* Text with the frame of a file, whose entities are none, is Open CASCADE's to refuse. */
+static void other_contents_are_told(void **state)
+{
+	(void)state;
+	write_text("empty.step", "");
+	refuse("empty.step", PSR_ERR_FORMAT, "empty");
+	write_text("empty.iges", "");
+	refuse("empty.iges", PSR_ERR_FORMAT, "empty");
+	write_text("a.step", "no part");
+	refuse("a.step", PSR_ERR_FORMAT, "not a STEP file: it does not begin with ISO-10303-21;");
+	write_text("a.igs", "no part");
+	refuse("a.igs", PSR_ERR_FORMAT, "not an IGES file in lines of 80 bytes: column 73 of the first has no S");
+	if (has_module) {
+		write_text("hollow.stp", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=NONSENSE(;\nENDSEC;\nEND-ISO-10303-21;\n");
+		refuse("hollow.stp", PSR_ERR_FORMAT, "the STEP file cannot be read: ");
+	}
+}
+
+static void without_the_module_it_is_named(void **state)
+{
+	struct psr_mesh *mesh = NULL;
+	struct psr_error err = { 0, "" };
+
+	(void)state;
+	setenv("PSR_CAD_MODULE", "/nowhere/module.so", 1);
+	assert_int_equal(psr_mesh_import(&mesh, "tests/data/import/pins.step", NULL, &err), PSR_ERR_UNSUPPORTED);
+	assert_non_null(strstr(err.text, "the CAD module cannot be loaded"));
+	assert_non_null(strstr(err.text, "libocct-data-exchange-dev"));
+	setenv("PSR_CAD_MODULE", "libm.so.6", 1);
+	assert_int_equal(psr_mesh_import(&mesh, "tests/data/import/pins.step", NULL, &err), PSR_ERR_VERSION);
+	unsetenv("PSR_CAD_MODULE");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(without_the_module_it_is_named), /* first: it is loaded once */
+		cmocka_unit_test(step_has_places_normals_and_colors),
+		cmocka_unit_test(iges_has_places_normals_and_colors),
+		cmocka_unit_test(a_finer_model_has_more_triangles),
+		cmocka_unit_test(a_file_that_ends_in_the_middle_is_told),
+		cmocka_unit_test(other_contents_are_told),
+	};
+
+	const char *build = getenv("BUILD");
+	char module[600];
+
+	snprintf(module, sizeof module, "%s/lib/psr-cad-occ.so", build != NULL ? build : ".");
+	has_module = access(module, R_OK) == 0;
+	return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
