@@ -291,7 +291,7 @@ $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o
 $(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
 STARVED := malloc calloc realloc aligned_alloc strdup strndup mmap pthread_create ZSTD_createCCtx ZSTD_createDCtx tjInitCompress
 $(call unit_bin,tests/unit/server/starve.c): LDFLAGS += $(addprefix -Wl$(,)--wrap=,$(STARVED))
-$(call unit_bin,tests/unit/client/wish.c tests/unit/client/suite.c $(filter tests/unit/bench/%,$(UNIT))): $(CLIENT_PARTS)
+$(call unit_bin,tests/unit/client/wish.c tests/unit/client/legend.c tests/unit/client/suite.c $(filter tests/unit/bench/%,$(UNIT))): $(CLIENT_PARTS)
 $(call unit_bin,$(filter tests/unit/view/%,$(UNIT))): $(sort $(VIEW_O) $(CLIENT_PARTS))
 $(BUILD)/tests/unit/window/%.o: ISA := $(shell pkg-config --cflags sdl2 2>/dev/null)
 $(call unit_bin,$(filter tests/unit/window/%,$(UNIT))): $(filter-out $(BUILD)/client/view/window/main.c.o,$(WINDOW_O)) $(VIEW_O) $(PSR_PARTS_O)

@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include "budget.h"
 #include "effects.h"
+#include "legend.h"
 #include "report.h"
 
 static int write_color(struct sink *sink, uint32_t k, const struct psr_event *event, struct psr_error *err)
@@ -110,17 +111,44 @@ static void print_progress(const struct sink *sink, const struct psr_event *even
 	fflush(stderr);
 }
 
+/* Sends a picture to its file. */
+static int send(struct sink *sink, uint32_t k, const struct psr_event *event, struct psr_error *err)
+{
+	if (sink->kind == SINK_FILE || sink->kind == SINK_NUMBERED)
+		return write_color(sink, k, event, err);
+	if (sink->kind == SINK_SHEET)
+		return sheet_add(&sink->sheet, k, event->picture, sink->scene->msg.background, err);
+	return sink->kind == SINK_ANIMATION ? animate(sink, k, event->picture, err) : PSR_OK;
+}
+
+/* The same with a legend, if the picture is to have one: in a copy, since reports are of the server's picture. */
+static int send_with_legend(struct sink *sink, uint32_t k, const struct psr_event *event, struct psr_error *err)
+{
+	const int is_plain = sink->kind != SINK_NONE && sink->show == NULL && sink->wish->plane_text == NULL;
+	const size_t bytes = 3 * (size_t)event->picture->width * event->picture->height;
+	struct psr_frame picture = *event->picture;
+	struct psr_event copy = *event;
+	struct legend legend;
+	int code;
+
+	if (!is_plain || sink->wish->has_no_legend || !legend_find(&legend, sink->scene, event->end))
+		return send(sink, k, event, err);
+	picture.rgb = malloc(bytes);
+	if (picture.rgb == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a legend on %ux%u pixels", picture.width, picture.height);
+	memcpy(picture.rgb, event->picture->rgb, bytes);
+	legend_draw(&legend, picture.rgb, picture.width, picture.height);
+	copy.picture = &picture;
+	code = send(sink, k, &copy, err);
+	free(picture.rgb);
+	return code;
+}
+
 int sink_take(uint32_t k, const struct psr_event *event, void *userdata, struct psr_error *err)
 {
 	struct sink *sink = userdata;
-	int code = PSR_OK;
+	int code = send_with_legend(sink, k, event, err);
 
-	if (sink->kind == SINK_FILE || sink->kind == SINK_NUMBERED)
-		code = write_color(sink, k, event, err);
-	else if (sink->kind == SINK_SHEET)
-		code = sheet_add(&sink->sheet, k, event->picture, sink->scene->msg.background, err);
-	else if (sink->kind == SINK_ANIMATION)
-		code = animate(sink, k, event->picture, err);
 	if (code == PSR_OK)
 		code = write_extra(sink, k, event, err);
 	if (code != PSR_OK)

@@ -13,7 +13,7 @@ struct sink_wish {
 	const char *program; /* "psr shot", for messages */
 	const char *output, *depth, *report, *plane_text, *show_text;
 	uint32_t sheet[2];   /* columns and rows */
-	int hash, effects, has_sheet;
+	int hash, effects, has_sheet, has_no_legend;
 	int64_t n_turn;      /* pictures of a turntable; 0: this is not one */
 	double seconds;      /* one turn of an animation takes */
 };

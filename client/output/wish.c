@@ -12,6 +12,9 @@ void sink_add_file_options(struct optlist *list, struct sink_wish *wish)
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &wish->depth, .arg = "FILE",
 		  .help = "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. "
 		          ".pfm, .exr or .tif." },
+		{ .name = "no-legend", .type = PSR_OPT_FLAG, .value = &wish->has_no_legend,
+		  .help = "Leave out the legend of --color-by, which tells in the picture's lower left corner what its colours "
+		          "stand for." },
 		{ .name = "report", .type = PSR_OPT_STRING, .value = &wish->report, .arg = "FILE",
 		  .help = "All about the picture as JSON: request, times, counts, hashes. - is standard output." },
 	};
