@@ -20,6 +20,7 @@ DEPS_FUZZ  := clang libclang-rt-dev
 CC  ?= cc
 CXX ?= c++
 AR  ?= ar
+HOST_CC ?= cc
 
 # Same bits everywhere: no contraction into fused multiply-add, no fast-math, no ISA flags outside of simd/.
 COMMON := -O2 -g -ffp-contract=off -fno-math-errno -fvisibility=hidden -fPIC -pthread
@@ -81,6 +82,7 @@ SIMD_O         := $(call objs,libpsr/simd/*.c libpsr/simd/c/*.c)
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 SIMD_O         += $(call objs,libpsr/simd/avx2/*.c libpsr/simd/avx512/*.c)
 endif
+SIMD_O         += $(BUILD)/libpsr/simd/masks/table.c.o
 LIBPSR_O       := $(call tree,libpsr/base libpsr/compare libpsr/dpoint libpsr/model libpsr/octree libpsr/render) $(SIMD_O)
 LIBPSR_BUILD_O := $(call tree,libpsr/import libpsr/surface libpsr/ray libpsr/sample libpsr/measure)
 IMAGE_O        := $(call tree,libpsr/image)
@@ -159,6 +161,18 @@ $(BUILD)/%.cc.o: %.cc
 	@mkdir -p $(@D)
 	$(call say,CXX,$<)
 	$(Q)$(CXX) $(CXXFLAGS_ALL) -c $< -o $@
+
+# The masks of splats: a program of this machine writes them, whichever machine the library is for.
+MASKS := $(BUILD)/libpsr/simd/masks
+$(MASKS)/make: libpsr/simd/masks/make.c libpsr/simd/ewa_masks.h
+	@mkdir -p $(@D)
+	$(call say,HOST,$<)
+	$(Q)$(HOST_CC) -std=gnu11 -O2 -ffp-contract=off $(WARN) -I. -o $@ $< -lm
+$(MASKS)/table.c: $(MASKS)/make
+	$(Q)$< >$@.new && mv $@.new $@
+$(MASKS)/table.c.o: $(MASKS)/table.c
+	$(call say,CC,$<)
+	$(Q)$(CC) $(CFLAGS_ALL) -c $< -o $@
 
 # Other people's code, compiled once for all configurations and not held to our warnings.
 $(BUILD)/libpsr/import/gltf/third_%.cc.o: build/third/third_%.cc.o

@@ -50,7 +50,9 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 	                              + n_bricks + (size_t)offcut_stride(plan) * h);
 	b->counters = psr_grow_huge(b->counters, &b->counters_size,
 	                            n_tiles * sizeof *b->tile + n_parts + rows * (sizeof *b->gaps + sizeof *b->shade));
-	if (b->pixels == NULL || b->counters == NULL)
+	if (plan->with_ewa)
+		b->sum = psr_grow_huge(b->sum, &b->sum_size, area * sizeof *b->sum);
+	if (b->pixels == NULL || b->counters == NULL || (plan->with_ewa && b->sum == NULL))
 		return PSR_ERR_MEMORY;
 	place(b, plan, n_words);
 	if (b->clean_pixels != b->pixels || b->clean_width != w || b->clean_height != h || b->clean_levels != stack->levels)
@@ -71,4 +73,5 @@ void buffers_clear(struct buffers *b)
 {
 	psr_free_huge(b->pixels, b->pixels_size);
 	psr_free_huge(b->counters, b->counters_size);
+	psr_free_huge(b->sum, b->sum_size);
 }

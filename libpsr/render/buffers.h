@@ -13,6 +13,8 @@ struct buffers {
 	uint16_t *rgb[3], *weight; /* linear colours by channel, and weights, of each pixel */
 	uint8_t *bricks;           /* 1: gaps marked the brick */
 	struct splat_offcuts offcuts; /* of plans with splats */
+	struct ewa_sum *sum;       /* of plans with EWA splats */
+	size_t sum_size;
 	struct warp_counts *tile;
 	struct gaps_counts *gaps;   /* by row of bricks, */
 	struct shade_counts *shade; /* like this */

@@ -3,6 +3,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include "ewa.h"
 #include "splat.h"
 
 /* Two passes over chunks of blocks: the first tests each block and counts entries by tile; the second writes the bins
@@ -39,12 +40,15 @@ struct counting {
 };
 
 /* What is drawn is half a pixel along both axes; the square of a veil two pixels apart or more; the disc of a splat. */
-float cull_place_error(const struct plan *plan, unsigned traits, float apart, float depth_error)
+float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits, float apart,
+                       float depth_error)
 {
 	const float half = 0.70710678f;
 	float drawn = half;
 
-	if (plan->with_splats)
+	if (plan->with_ewa && in->cull.cubes != NULL)
+		drawn = EWA_REACH * apart + EWA_REACH_PIXELS;
+	else if (plan->with_splats)
 		drawn = SPLAT_RADIUS * apart > half ? SPLAT_RADIUS * apart : half;
 	else if (traits & PSR_BLOCK_THIN && apart >= 2)
 		drawn = half * (apart + 1);
@@ -60,6 +64,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 	const struct plan_instance *in = &plan->instance[chunk->instance];
 	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->cull->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
+	const int is_ewa = plan->with_ewa && in->cull.cubes != NULL; /* splats close gaps themselves */
 	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
 
 	for (uint32_t i = 0; i < n; i++) {
@@ -71,16 +76,17 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 			chunk->n_masked++;
 			continue;
 		}
-		const int is_clamped = batch->level[i] > PSR_MAX_DEPTH_LEVEL;
+		const int is_clamped = !is_ewa && batch->level[i] > PSR_MAX_DEPTH_LEVEL;
+		const int level = is_clamped ? PSR_MAX_DEPTH_LEVEL : is_ewa ? 0 : batch->level[i];
 		*hit = (struct cull_hit){
 			.slot = in->first_slot + block, .instance = (uint16_t)chunk->instance, .near = batch->near[i],
-			.level = (uint8_t)(is_clamped ? PSR_MAX_DEPTH_LEVEL : batch->level[i]), .is_mixed = batch->is_mixed[i] & 1,
+			.level = (uint8_t)level, .is_mixed = batch->is_mixed[i] & 1,
 			.x0 = (uint16_t)batch->x0[i], .x1 = (uint16_t)batch->x1[i],
 			.y0 = (uint16_t)batch->y0[i], .y1 = (uint16_t)batch->y1[i],
 			.tile_x0 = (uint8_t)batch->tile_x0[i], .tile_x1 = (uint8_t)batch->tile_x1[i],
 			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
 		};
-		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats);
+		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats || is_ewa);
 		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
@@ -91,7 +97,8 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		chunk->flags |= b->flags[block];
 		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
 		chunk->n_samples += cull_n_samples(in, block);
-		const float error = cull_place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
+		const float error = cull_place_error(plan, in, psr_blocks_traits(b, block), batch->apart[i],
+		                                     batch->depth_error[i]);
 		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;
 	}
@@ -298,7 +305,7 @@ static void note_levels(const struct cull *cull, const struct cull_chunk *chunk,
 static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report *report)
 {
 	float place_error = 0;
-	uint64_t n_masked = 0, n_mixed = 0;
+	uint64_t n_masked = 0, n_mixed = 0, n_splats = 0;
 
 	report->n_blocks = plan->n_slots;
 	report->n_samples = plan->n_samples;
@@ -318,6 +325,7 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		if (chunk->traits & PSR_BLOCK_BENT)
 			plan->view.needs |= STRIP_BENT;
 		report->n_clamped += chunk->n_clamped;
+		n_splats += plan->with_ewa && plan->instance[chunk->instance].cull.cubes != NULL ? chunk->n_samples : 0;
 		n_masked += chunk->n_masked;
 		n_mixed += chunk->n_mixed;
 		if (chunk->place_error > place_error)
@@ -331,6 +339,8 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 	else if (plan->is_full)
 		report->levels = (2u << PSR_MAX_DEPTH_LEVEL) - 1;
 	note_tests(plan, report, n_masked, n_mixed);
+	const enum psr_why none = plan->asks_ewa ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	effect_note(report, PSR_EFFECT_SPLATS, n_splats ? PSR_WHY_RAN : none, n_splats);
 }
 
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,

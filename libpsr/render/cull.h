@@ -68,7 +68,8 @@ void cull_choose_levels(struct bins *bins, const struct plan *plan);
 
 /* How far what a block draws may be from the surface, in pixels: a sample from the surface, and what it draws from the
  * sample. apart, depth_error: as the kernel has them. */
-float cull_place_error(const struct plan *plan, unsigned traits, float apart, float depth_error);
+float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits, float apart,
+                       float depth_error);
 
 /* Visibility masks of the screen's regions, for one instance ([G] 6.3): one mask for each of the 10 x 10 ranges of
  * regions that a block can lie in, in place of the smallest tree node that holds the block. */

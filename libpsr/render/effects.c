@@ -29,6 +29,9 @@ static const struct {
 	[PSR_EFFECT_VEILS] = { "veils",
 	                       { "", "the frame has neither colour nor depth", "no block in view is of thin things", "",
 	                         "" } },
+	[PSR_EFFECT_SPLATS] = { "splats",
+	                        { "", "the settings turn it off", "no octree is in view; other instances are drawn as without",
+	                          "", "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -52,6 +55,7 @@ const char *psr_effect_counts(enum psr_effect effect)
 		[PSR_EFFECT_TABLE] = "normals whose light was tabulated",
 		[PSR_EFFECT_SMOOTH] = "pixels at edges",
 		[PSR_EFFECT_SHEER] = "pixels with surfaces that let a part of the light through",
+		[PSR_EFFECT_SPLATS] = "leaves of octrees, as splats",
 		[PSR_EFFECT_VEILS] = "pixels with things that are narrower than a sample's cell",
 	};
 

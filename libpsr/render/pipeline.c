@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/direction.h"
 #include "base/mem.h"
+#include "ewa.h"
 #include "groups.h"
 #include "planes.h"
 #include "renderer.h"
@@ -13,7 +14,7 @@ static void warp_one(int i, void *userdata)
 	const uint32_t tile = (uint32_t)r->bins.by_work[i];
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	const uint32_t clean = warp_parts(&r->plan, b->is_clean, tile);
-	const struct warp_into into = { &b->stack, clean, NULL };
+	const struct warp_into into = { &b->stack, clean, NULL, b->sum };
 	/* Where samples are half a plain pixel apart or less: magnified stills keep their whole discs. */
 	const unsigned cut_below = r->inside != NULL ? r->inside->pass : 0;
 	const struct splat_into discs = { &b->stack, clean, b->offcuts, cut_below };
@@ -23,6 +24,8 @@ static void warp_one(int i, void *userdata)
 		b->tile[tile] = splat_tile(r->simd, &r->plan, &r->bins, &discs, tile);
 	else if (!is_empty || clean != ALL_PARTS)
 		b->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &into, tile);
+	if (r->plan.with_ewa && !is_empty)
+		ewa_tile(r->simd, &r->plan, &r->bins, &into, tile);
 }
 
 /* Draws the words and cells of all tiles. */
@@ -116,6 +119,10 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 		return render_cancelled(err);
 	if (rc || buffers_prepare(&r->buffers, &r->plan, report->levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
+	if (r->plan.with_ewa) {
+		r->plan.view.sum = r->buffers.sum;
+		r->plan.view.sum_stride = r->plan.width;
+	}
 	if (r->plan.is_full)
 		memset(r->buffers.is_clean, 0, (size_t)r->plan.parts_x * r->plan.parts_y);
 	else

@@ -119,7 +119,8 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
-		.with_splats = plan->with_splats || warp->blocks->opacity != NULL,
+		.with_splats = plan->with_splats || warp->blocks->opacity != NULL || (plan->with_ewa && cubes != NULL),
+		.reach = plan->with_ewa && cubes != NULL,
 		.region_from = { (float)plan->window.left, (float)plan->window.top },
 		.region_scale = { (float)SCREEN_SIDE / (float)plan->window.picture_width,
 		                  (float)SCREEN_SIDE / (float)plan->window.picture_height },
@@ -267,6 +268,8 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->has_sheer = plan->has_thin = 0;
 	plan->caster = NO_CASTER;
 	plan->with_splats = settings->with_splats;
+	plan->asks_ewa = settings->with_ewa;
+	plan->with_ewa = settings->with_ewa && plan->has_octrees;
 	plan->is_smooth = settings->smooth != PSR_SMOOTH_NONE;
 	plan->is_wide = settings->is_wide;
 	plan->cancel = settings->cancel;

@@ -32,6 +32,7 @@ struct plan {
 	double center[2];          /* pixels from the frame's corner to where the view axis meets it */
 	int perspective;
 	int with_splats;
+	int asks_ewa, with_ewa; /* the latter: and an instance is drawn as an octree */
 	int is_smooth;
 	int is_wide;
 	unsigned cull_tests;

@@ -31,6 +31,23 @@ void plan_lattice(struct warp_lattice *out, const struct psr_projection *project
 	}
 }
 
+/* What EWA splats need of the axes of cubes. */
+static void plan_ewa(struct ewa_view *out, const double axis[3][3], double depth)
+{
+	double dual[3][3];
+
+	for (int i = 0; i < 3; i++)
+		v3d_cross(dual[i], axis[(i + 1) % 3], axis[(i + 2) % 3]);
+	const double unit = 1 / v3d_dot(axis[0], dual[0]);
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++) {
+			out->axis[i][k] = (float)axis[i][k];
+			out->square[i][k] = (float)v3d_dot(axis[i], axis[k]);
+			out->dual[i][k] = (float)(dual[i][k] * unit);
+		}
+	out->depth = (float)depth;
+}
+
 void plan_cubes(struct warp_cubes *out, double to_camera[3][3], const double center[3], const struct plan *plan,
                 double focal)
 {
@@ -41,6 +58,8 @@ void plan_cubes(struct warp_cubes *out, double to_camera[3][3], const double cen
 			out->axis[a][k] = (a < 2 ? focal : 1) * to_camera[a][k] + (plan->perspective ? half[a] * to_camera[2][k] : 0);
 		out->origin[a] = (a < 2 ? focal : 1) * center[a] + (plan->perspective ? half[a] * center[2] : half[a]);
 	}
+	if (plan->with_ewa)
+		plan_ewa(&out->ewa, (const double(*)[3])out->axis, v3d_length(to_camera[2]));
 	for (uint32_t l = 0; l < out->model->groups.n_levels; l++) {
 		struct warp_octants *to = &out->level[l];
 		const double edge = out->model->level[l].edge, offset = edge * (CUBES_DIAGONAL / (2 * OCTREE_OFFSETS) / 511);

@@ -106,7 +106,7 @@ static uint16_t bound_of(const struct simd *simd, const struct plan *plan, uint3
 	struct cull_batch batch;
 
 	simd->cull(&batch, &in->cull, block, 1);
-	return to_bound(cull_place_error(plan, psr_blocks_traits(in->cull.blocks, block), batch.apart[0],
+	return to_bound(cull_place_error(plan, in, psr_blocks_traits(in->cull.blocks, block), batch.apart[0],
 	                                 batch.depth_error[0]));
 }
 

@@ -229,6 +229,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	struct psr_frame fine;
 
 	window.with_splats = !still->is_fine;
+	window.with_ewa = 0;
 	window.smooth = still->is_fine ? PSR_SMOOTH_EDGES : PSR_SMOOTH_NONE;
 	window.is_wide = is_wide;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
@@ -289,7 +290,7 @@ static int same_outline(const struct render_settings *a, const struct render_set
 {
 	return a->width == b->width && a->height == b->height && a->spacing_px == b->spacing_px
 	       && a->cull_tests == b->cull_tests && a->is_full == b->is_full && a->with_splats == b->with_splats
-	       && a->gap_threshold == b->gap_threshold && a->gap_method == b->gap_method && a->cell_bias == b->cell_bias;
+	       && a->with_ewa == b->with_ewa && a->gap_threshold == b->gap_threshold && a->gap_method == b->gap_method && a->cell_bias == b->cell_bias;
 }
 
 /* Notes what a still's is_inside depends on. *has_changed: it differs from what was noted before. */

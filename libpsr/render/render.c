@@ -56,6 +56,7 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
 	settings.spacing_px = asked->spacing_px;
 	settings.smooth = asked->smooth;
 	settings.pass = asked->pass;
+	settings.with_ewa = asked->with_splats && asked->pass == 0;
 	if (asked->cancel.is_cancelled != NULL)
 		settings.cancel = (struct psr_cancel){ is_cancelled, &latch };
 	if (settings.pass == 0 && settings.smooth != PSR_SMOOTH_FINE)

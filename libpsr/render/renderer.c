@@ -47,7 +47,7 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 	const uint64_t refiner = r->refiner != NULL ? refiner_bytes(r->refiner) : 0;
 
 	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size
-	       + sheer_bytes(&r->sheer) + r->buffers.pixels_size + r->buffers.counters_size + r->lit_size
+	       + sheer_bytes(&r->sheer) + r->buffers.pixels_size + r->buffers.counters_size + r->buffers.sum_size + r->lit_size
 	       + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 

@@ -19,6 +19,8 @@ int settings_validate(const struct render_settings *settings, struct psr_error *
 		return psr_fail(err, PSR_ERR_ARG, "unknown cull tests %#x", settings->cull_tests);
 	if (!(settings->gap_threshold >= 0 && settings->gap_threshold <= 64))
 		return psr_fail(err, PSR_ERR_ARG, "a gap threshold of %g pixels is not within 0..64", settings->gap_threshold);
+	if (settings->with_splats && settings->with_ewa)
+		return psr_fail(err, PSR_ERR_ARG, "leaves cannot be discs and EWA splats at the same time");
 	if ((unsigned)settings->gap_method > PSR_GAPS_CLOSED)
 		return psr_fail(err, PSR_ERR_ARG, "unknown gap method %d", (int)settings->gap_method);
 	if (!(settings->spacing_px >= 1.0 / 64 && settings->spacing_px <= 64))

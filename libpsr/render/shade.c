@@ -13,7 +13,7 @@ enum psr_why shade_wants_table(const struct plan *plan)
 {
 	if (plan->n_lights == 0)
 		return PSR_WHY_NOTHING;
-	if (plan->view.needs & (STRIP_POSITION | STRIP_TWO_SIDED) || plan->has_points)
+	if (plan->view.needs & (STRIP_POSITION | STRIP_TWO_SIDED) || plan->has_points || plan->with_ewa)
 		return PSR_WHY_VOID;
 	if (plan->n_lights < TABLE_LIGHTS || plan->n_instances > 1 || (uint64_t)plan->width * plan->height < TABLE_PIXELS)
 		return PSR_WHY_COST;

@@ -38,7 +38,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 	const uint32_t x0 = tile % plan->tiles_x * TILE_WIDTH, y0 = tile / plan->tiles_x * TILE_HEIGHT;
 	const uint32_t width = plan->width - x0 < TILE_WIDTH ? plan->width - x0 : TILE_WIDTH;
 	const int is_empty = !d->stack.levels && d->bins->tile_begin[tile] == d->bins->tile_begin[tile + 1];
-	const struct warp_into into = { &d->stack, 0, own };
+	const struct warp_into into = { &d->stack, 0, own, NULL };
 
 	if (!is_empty)
 		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &into, tile).n_inside);

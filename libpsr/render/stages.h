@@ -36,6 +36,7 @@ struct render_settings {
 	int is_full;            /* debug: disables every shortcut that does not change the output */
 	int with_splats; /* 0: samples fill pixels, and depth buffers tell where gaps are ([G] 4). 1: samples are discs on
 	                  * the surface that close the gaps themselves: for pixels finer than samples */
+	int with_ewa; /* 1: leaves of octrees are quantised EWA splats ([B] 5.2). No discs at the same time; pass 0 */
 	int is_wide;     /* 1: colours are not clamped at 1, and stay in the renderer, see renderer_light(); the frame has no
 	                  * rgb, and is not smoothed */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */

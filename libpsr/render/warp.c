@@ -24,7 +24,7 @@ static inline warp_fn *kernel_of(const struct simd *simd, const struct plan *pla
 {
 	const struct warp_instance *in = &plan->warp[entry->instance];
 
-	return in->cubes != NULL ? simd->warp_leaves : in->points != NULL ? simd->warp_points : simd->warp;
+	return in->cubes != NULL ? (plan->with_ewa ? simd->ewa_words : simd->warp_leaves) : in->points != NULL ? simd->warp_points : simd->warp;
 }
 
 uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const struct warp_target *target,

@@ -16,6 +16,7 @@ struct warp_into {
 	const struct psr_zstack *stack; /* cells, and words unless there is `own` */
 	uint32_t clean;                 /* bits of parts that need no clearing */
 	uint64_t *own;                  /* WARP_OWN_WORDS, or NULL */
+	struct ewa_sum *sum;            /* of the picture; of plans with EWA splats */
 };
 
 /* Warps entries of any representations: each run of one by its kernel. */

@@ -19,6 +19,7 @@ struct cull_view {
 	float focal, near_z, width, height;
 	float center_x, center_y; /* pixels: where the view axis meets the picture */
 	int with_cones, with_splats;
+	int reach;            /* 1: blocks draw as far as their neighbours are, where that is beyond the guard band, too */
 	/* Regions of the picture for visibility masks ([G] 6.3, 4x4 of them): region a of a pixel is region_scale[a] times
 	 * the pixel's coordinate plus region_from[a]. */
 	float region_from[2], region_scale[2];

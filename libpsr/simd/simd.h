@@ -25,6 +25,10 @@ struct simd {
 	warp_fn *warp;
 	warp_fn *warp_leaves; /* of entries that are cubes; the former's are blocks */
 	warp_fn *warp_points; /* of entries that are groups of differential points: of level 0, without cells */
+	/* The words of cubes as EWA splats; then, with all words drawn, the sums of their pixels. The latter returns how many
+	 * splats it was given. Neither lowers cells. */
+	warp_fn *ewa_words;
+	warp_fn *ewa_sums;
 	veil_fn *veil;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;

@@ -61,6 +61,8 @@ struct strip_view {
 	float half_width, half_height, focal; /* pixels; the former to where the view axis meets the picture */
 	int perspective;
 	unsigned needs; /* enum strip_needs */
+	const struct ewa_sum *sum; /* of the picture's pixels, of leaves as EWA splats; NULL: none */
+	uint32_t sum_stride;
 };
 
 /* A light in camera space. */

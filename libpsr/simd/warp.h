@@ -4,6 +4,7 @@
 
 #include "model/cubes.h"
 #include "model/points.h"
+#include "ewa.h"
 #include "tile.h"
 #include "zstack.h"
 
@@ -41,6 +42,7 @@ struct warp_cubes {
 	const struct psr_cubes *model;
 	double origin[3], axis[3][3];
 	struct warp_octants level[CUBES_MOST_LEVELS];
+	struct ewa_view ewa; /* of plans with EWA splats */
 };
 
 /* Differential points in a picture. Axis a of a point p of inner coordinates is origin[a] + axis[a] . p: focal times x
@@ -92,6 +94,8 @@ struct warp_target {
 	int32_t x0, y0, x1, y1;
 	uint32_t clean; /* bits of parts whose words are empty before the tile is cleared */
 	uint32_t bare;  /* bits of parts where nothing is drawn */
+	struct ewa_sum *sum; /* of pixel (x0, y0), for ewa_sums */
+	uint32_t sum_stride;
 	struct warp_cells {
 		float *z;
 		uint32_t stride, first;

@@ -1,8 +1,8 @@
 /* What drawing an octree costs: octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] MESH|CLOUD.las [BLOCKS.psr]
  *
- * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. With
- * blocks of the same object, frames of both take turns, and their times are medians; then those of stages. Points a
- * second are those of cull and warp together. */
+ * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. Frames of
+ * points, of EWA splats, and with blocks of the same object those of blocks take turns, and their times are medians; then
+ * those of stages. Points a second are those of cull and warp together, splats likewise. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +29,9 @@ struct subject {
 	const char *name;
 	struct psr_model *model;
 	enum psr_representation representation;
+	int with_splats;
 };
+#define MOST_SUBJECTS 3
 
 struct times {
 	double frame[MOST_FRAMES], points[MOST_FRAMES], stage[PSR_N_STAGES][MOST_FRAMES], samples, covered;
@@ -131,6 +133,7 @@ static int draw(struct times *times, const struct bench *bench, const struct sub
 	psr_light_key(&light, &scene.camera);
 	light.casts_shadow = 0;
 	psr_settings_default(&settings, bench->side, bench->side);
+	settings.with_splats = subject->with_splats;
 	rc = psr_render(bench->renderer, &scene, &settings, bench->pool, &frame, err);
 	if (rc != PSR_OK || times == NULL || times->n == MOST_FRAMES)
 		return rc;
@@ -170,7 +173,7 @@ static void print_times(double nearer_by, const char *name, struct times *times)
 static int measure(const struct bench *bench, const struct subject *subject, int n_subjects, int n_rounds,
                    struct psr_error *err)
 {
-	static struct times times[2];
+	static struct times times[MOST_SUBJECTS];
 
 	print_head();
 	for (int d = 0; d < N_DISTANCES; d++) {
@@ -185,9 +188,10 @@ static int measure(const struct bench *bench, const struct subject *subject, int
 				}
 		for (int s = 0; s < n_subjects; s++)
 			print_times(1 / nearer[d], subject[s].name, &times[s]);
-		if (n_subjects == 2)
-			printf("%-10g %7s %9.2f\n", 1 / nearer[d], "ratio",
-			       stats_median(times[0].frame, (size_t)times[0].n) / stats_median(times[1].frame, (size_t)times[1].n));
+		for (int s = 1; s < n_subjects; s++)
+			printf("%-10g %7s %9.2f of %s\n", 1 / nearer[d], "ratio",
+			       stats_median(times[0].frame, (size_t)times[0].n) / stats_median(times[s].frame, (size_t)times[s].n),
+			       subject[s].name);
 	}
 	return PSR_OK;
 }
@@ -202,19 +206,21 @@ struct wish {
 static int run(const char *path, const char *blocks, const struct wish *wish, struct psr_error *err)
 {
 	const uint32_t side = wish->side;
-	struct subject subject[2] = { { "octree", NULL, PSR_OCTREE }, { "blocks", NULL, PSR_BLOCKS } };
+	struct subject subject[MOST_SUBJECTS] = { { "points", NULL, PSR_OCTREE, 0 }, { "splats", NULL, PSR_OCTREE, 1 },
+		                                      { "blocks", NULL, PSR_BLOCKS, 0 } };
 	struct bench bench = { .frame = { .width = side, .height = side }, .side = side };
 	struct octree *tree = NULL;
-	int rc = blocks != NULL ? psr_model_read(&subject[1].model, blocks, err) : PSR_OK;
+	int rc = blocks != NULL ? psr_model_read(&subject[2].model, blocks, err) : PSR_OK;
 
 	if (rc == PSR_OK)
 		rc = (strstr(path, ".las") != NULL ? read_cloud : read_mesh)(&tree, path, &wish->options, err);
 	if (rc == PSR_OK)
-		rc = make_model(&subject[0].model, tree, subject[1].model, err);
+		rc = make_model(&subject[0].model, tree, subject[2].model, err);
 	if (rc == PSR_OK)
 		rc = psr_model_make_cubes(subject[0].model, err);
 	if (rc != PSR_OK)
 		return rc;
+	subject[1].model = psr_model_ref(subject[0].model);
 	const struct psr_cubes *cubes = psr_model_cubes(subject[0].model);
 	printf("%.2f M leaves, %.1f a cube; %.2f bits a leaf of codes, %.2f more of cubes and coarser levels\n",
 	       (double)tree->n_leaves * 1e-6, (double)tree->n_leaves / cubes->level[0].n,
@@ -226,10 +232,10 @@ static int run(const char *path, const char *blocks, const struct wish *wish, st
 	if (rc == PSR_OK)
 		rc = psr_pool_create(&bench.pool, wish->n_threads, err);
 	if (rc == PSR_OK)
-		rc = measure(&bench, subject, blocks != NULL ? 2 : 1, wish->n_rounds, err);
+		rc = measure(&bench, subject, blocks != NULL ? 3 : 2, wish->n_rounds, err);
 	psr_pool_destroy(bench.pool);
 	psr_renderer_destroy(bench.renderer);
-	for (int s = 0; s < 2; s++)
+	for (int s = 0; s < MOST_SUBJECTS; s++)
 		psr_model_unref(subject[s].model);
 	return rc;
 }

@@ -1,4 +1,4 @@
-/* warp_leaves: cubes of 1 to 64 leaves at several levels, with and without normals and offsets, in tiles of pictures of
+/* warp_leaves, and as EWA splats ewa_words and ewa_sums: cubes of 1 to 64 leaves at several levels, with and without normals and offsets, in tiles of pictures of
  * all sizes. */
 #include <math.h>
 #include <string.h>
@@ -8,6 +8,7 @@
 #define MAX_LEVELS 3
 
 enum numbers { PLAIN, SPOILT };
+enum kernel { LEAVES, WORDS, SUMS };
 
 /* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0: any. */
 static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, struct psr_cube *cube,
@@ -34,6 +35,8 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 	memcpy(codes, some, n_codes);
 	*tree = (struct octree){ .levels = 4 + (int)check_below(c, 17), .low = { -1, -1, -1 }, .edge = 2, .code = codes,
 		                     .n_codes = n_codes, .n_leaves = n_leaves };
+	if (check_one_in(c, 2))
+		tree->color = check_in(c, n_leaves, sizeof *tree->color);
 	if (check_one_in(c, 4))
 		return;
 	tree->normal = check_in(c, n_leaves, sizeof *tree->normal);
@@ -112,7 +115,34 @@ static void random_placing(struct check *c, struct warp_cubes *to, const struct 
 		}
 }
 
-static void leaves(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_leaves, enum numbers numbers)
+/* The axes of a picture as plan_warp.c has them for splats, and sums of a tile. */
+static void splats(struct check *c, struct picture *p, struct warp_instance *in, struct warp_cubes *to)
+{
+	struct warp_target *t = &p->target;
+
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++) {
+			const double *a = to->axis[i], *b = to->axis[k];
+
+			in->turn[i][k] = (float)check_real(c, -1, 1);
+			to->ewa.axis[i][k] = (float)a[k];
+			to->ewa.square[i][k] = (float)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+			to->ewa.dual[i][k] = (float)check_real(c, -1, 1);
+		}
+	to->ewa.depth = (float)check_real(c, 0.01, 0.2);
+	t->sum_stride = (uint32_t)(t->x1 - t->x0) + check_below(c, 3);
+	const size_t n = (size_t)t->sum_stride * (size_t)(t->y1 - t->y0);
+	t->sum = check_out(c, n, sizeof *t->sum);
+	memset(t->sum, 0, n * sizeof *t->sum);
+}
+
+static warp_fn *kernel_of(const struct simd *simd, enum kernel kernel)
+{
+	return kernel == WORDS ? simd->ewa_words : kernel == SUMS ? simd->ewa_sums : simd->warp_leaves;
+}
+
+static void draw_cubes(struct check *c, struct picture *p, enum kernel kernel, uint32_t n_entries, uint32_t n_leaves,
+                       enum numbers numbers)
 {
 	struct warp_target *t = &p->target;
 	struct octree tree[MAX_LEVELS];
@@ -129,6 +159,8 @@ static void leaves(struct check *c, struct picture *p, uint32_t n_entries, uint3
 	in->cubes = to;
 	in->first_slot = check_below(c, (1u << 26) - 1 - cubes->groups.n_blocks);
 	picture_sight(c, in, t, numbers == SPOILT);
+	if (kernel != LEAVES)
+		splats(c, p, in, to);
 	for (uint32_t e = 0; e < n_entries; e++) {
 		const uint32_t cube = check_below(c, cubes->groups.n_blocks);
 		int level = (int)check_below(c, PSR_MAX_DEPTH_LEVEL + 1);
@@ -141,7 +173,12 @@ static void leaves(struct check *c, struct picture *p, uint32_t n_entries, uint3
 	}
 	check_units(c, (uint64_t)n_entries * n_leaves);
 	while (check_next(c))
-		check_result(c, c->simd->warp_leaves(t, entry, n_entries));
+		check_result(c, kernel_of(c->simd, kernel)(t, entry, n_entries));
+}
+
+static void leaves(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_leaves, enum numbers numbers)
+{
+	draw_cubes(c, p, LEAVES, n_entries, n_leaves, numbers);
 }
 
 static void random_leaves(struct check *c)
@@ -167,6 +204,38 @@ static void narrow_tiles(struct check *c)
 
 	picture_make(c, &p, w, check_one_in(c, 2) ? 1 : TILE_HEIGHT + 1, check_u32(c));
 	leaves(c, &p, 1 + check_below(c, 12), 0, PLAIN);
+}
+
+static void random_splat_words(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	draw_cubes(c, &p, WORDS, check_below(c, 20), 0, PLAIN);
+}
+
+static void random_splat_sums(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	draw_cubes(c, &p, SUMS, check_below(c, 20), 0, PLAIN);
+}
+
+static void bench_splat_words(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	draw_cubes(c, &p, WORDS, 400, 16, PLAIN);
+}
+
+static void bench_splat_sums(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	draw_cubes(c, &p, SUMS, 400, 16, PLAIN);
 }
 
 static void bench_full(struct check *c)
@@ -199,6 +268,10 @@ int main(int argc, char **argv)
 		{ "warp_leaves: random cubes, tiles and levels", random_leaves, 2000, NULL },
 		{ "warp_leaves: infinite, huge, denormal and no numbers", spoilt_numbers, 2000, NULL },
 		{ "warp_leaves: tiles narrower than a vector", narrow_tiles, 500, NULL },
+		{ "ewa_words: random cubes and tiles", random_splat_words, 100, NULL },
+		{ "ewa_sums: random cubes and tiles", random_splat_sums, 100, NULL },
+		{ "ewa_words, cubes a fourth full", bench_splat_words, 0, "leaf" },
+		{ "ewa_sums, these", bench_splat_sums, 0, "leaf" },
 		{ "warp_leaves, full cubes", bench_full, 0, "leaf" },
 		{ "warp_leaves, cubes a fourth full", bench_fourths, 0, "leaf" },
 		{ "warp_leaves, these with offsets and depth level 1", bench_offsets, 0, "leaf" },

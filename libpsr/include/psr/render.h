@@ -33,6 +33,9 @@ struct psr_settings {
 	 * their depths. It draws colour and depth only, takes about 4^p times as long, and needs no other pass before
 	 * it. 0..PSR_MAX_PASS; 0 by default. */
 	unsigned pass;
+	/* 1: octrees are drawn as anti-aliased splats ([B] 5.2) in place of points and the gaps between them: leaves of one
+	 * surface are mixed. Other instances are drawn as without it. 0 by default; passes above 0 ignore it. */
+	int with_splats;
 	struct psr_cancel cancel; /* ends the frame within some milliseconds; nobody by default */
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);

@@ -38,6 +38,7 @@ enum psr_effect {
 	PSR_EFFECT_SMOOTH,    /* count: pixels at edges, blended with the surface behind */
 	PSR_EFFECT_SHEER,     /* count: pixels with translucent surfaces, veils left out */
 	PSR_EFFECT_VEILS,     /* count: pixels with things narrower than a sample's cell */
+	PSR_EFFECT_SPLATS,    /* count: leaves of octrees in view, drawn as splats ([B] 5.2) */
 	PSR_N_EFFECTS
 };
 enum psr_why {

@@ -99,7 +99,8 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 		const int32_t used = level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL;
 
 		/* Two pixels beyond the guard band's cell cover rounding. */
-		const float grown = r * 1.0001f, guard = psr_float_from_bits((uint32_t)(127 + used) << 23) + 2;
+		const float band = psr_float_from_bits((uint32_t)(127 + used) << 23) + 2;
+		const float grown = r * 1.0001f, guard = psr_choose((v.reach != 0) & (pixels > band), pixels, band);
 		const float front1 = cz - grown, z0 = psr_choose(front1 > v.near_z, front1, v.near_z), z1 = cz + grown;
 		const float near_scale = v.focal * psr_choose(is_perspective, 1 / z0, 1);
 		const float far_scale = v.focal * psr_choose(is_perspective, 1 / z1, 1);

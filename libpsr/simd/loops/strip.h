@@ -231,6 +231,34 @@ static void prepare_highlights(struct strip *s, const float ambient[3])
 	}
 }
 
+/* Takes the looks of samples from the sums of their pixels. */
+static void ewa_resolve(struct strip *strip, const struct strip_view *view, uint32_t first, uint32_t end)
+{
+	const struct strip_pixels *p = strip->pixels;
+	const struct ewa_sum *row = view->sum + (size_t)p->y * view->sum_stride + p->x0;
+
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t *lane = row[p->x[i]].lane, weight = lane[EWA_WEIGHT];
+		float n[3];
+
+		if (weight == 0 || weight >= EWA_MOST_WEIGHT)
+			continue;
+		const float share = 1 / ((float)(int32_t)weight * EWA_COLOR_ONE);
+		strip->dr[i] = (float)lane[EWA_COLOR] * share;
+		strip->dg[i] = (float)lane[EWA_COLOR + 1] * share;
+		strip->db[i] = (float)lane[EWA_COLOR + 2] * share;
+		for (int k = 0; k < 3; k++)
+			n[k] = (float)(int32_t)lane[EWA_NORMAL + k];
+		const float length2 = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+		if (!(length2 > 0))
+			continue;
+		const float unit = 1 / __builtin_sqrtf(length2);
+		strip->nx[i] = n[0] * unit;
+		strip->ny[i] = n[1] * unit;
+		strip->nz[i] = n[2] * unit;
+	}
+}
+
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const struct strip_pixels *p = strip->pixels;
@@ -253,6 +281,8 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			points_resolve(strip, view, in, first, end);
 		else
 			turn_normals(strip, in->turn, first, end);
+		if (in->cubes && view->sum)
+			ewa_resolve(strip, view, first, end);
 		if (p->has_cones)
 			straighten(strip, in->turn, first, end);
 	}

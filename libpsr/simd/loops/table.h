@@ -2,6 +2,7 @@
  * instructions. Arguments: the kernels of warp, leaves, veil and reproject_look, and a macro that names a kernel's variant where one is
  * written by hand. */
 #include "cull.h"
+#include "ewa.h"
 #include "fill_pull.h"
 #include "fill_push.h"
 #include "gaps.h"
@@ -23,6 +24,8 @@
 	.warp = warp_kernel,                           \
 	.warp_leaves = leaves_kernel,                  \
 	.warp_points = warp_points,                    \
+	.ewa_words = ewa_words,                        \
+	.ewa_sums = ewa_sums,                          \
 	.veil = veil_kernel,                           \
 	.strip_list = KERNEL(strip_list),              \
 	.strip_find = strip_find,                      \

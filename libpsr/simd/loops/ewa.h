@@ -1,0 +1,251 @@
+/* EWA splats: how leaves lie in the picture, and which masks are theirs. */
+#ifndef PSR_SIMD_LOOPS_EWA_H
+#define PSR_SIMD_LOOPS_EWA_H
+
+#include "base/srgb.h"
+#include "simd/cube.h"
+#include "ewa_place.h"
+
+/* ---- one splat: what is drawn of it ---- */
+
+struct ewa_one {
+	int32_t x, y, radius;
+	float z, zx, zy, least; /* z' in the middle of pixel (x, y), what a pixel to the right or down adds, and the least */
+	const uint8_t *weight;  /* of the first row, */
+	int32_t next;           /* and how far the next row is */
+	uint32_t core, id;
+};
+
+static inline void ewa_pick(struct ewa_one *one, const struct ewa_leaves *l, uint32_t i)
+{
+	const uint32_t size = (uint32_t)l->size[i], radius = ewa_size[size].radius, side = EWA_SIDE(radius);
+	const uint32_t mask = (uint32_t)(l->shape[i] * EWA_SECTORS + l->sector[i]);
+
+	one->x = l->x[i];
+	one->y = l->y[i];
+	one->radius = (int32_t)radius;
+	one->z = l->z[i];
+	one->zx = l->zx[i];
+	one->zy = l->zy[i];
+	one->least = l->least[i];
+	one->weight = ewa_weight + ewa_size[size].first + mask * (side * side);
+	one->next = (int32_t)side;
+	if (l->is_flipped[i]) {
+		one->weight += side * (side - 1);
+		one->next = -one->next;
+	}
+	one->core = ewa_core[size * (EWA_SHAPES * EWA_SECTORS) + mask];
+	one->id = l->id[i];
+}
+
+/* The part of a square around a pixel that is in the tile. */
+struct ewa_part {
+	int32_t x0, x1, y0, y1;
+};
+
+static inline int ewa_clip(struct ewa_part *part, const struct warp_target *t, int32_t x, int32_t y, int32_t radius)
+{
+	part->x0 = x - radius > t->x0 ? x - radius : t->x0;
+	part->x1 = x + radius + 1 < t->x1 ? x + radius + 1 : t->x1;
+	part->y0 = y - radius > t->y0 ? y - radius : t->y0;
+	part->y1 = y + radius + 1 < t->y1 ? y + radius + 1 : t->y1;
+	return part->x0 < part->x1 && part->y0 < part->y1;
+}
+
+/* The depth at an offset from the middle pixel. */
+static inline float ewa_depth(const struct ewa_one *one, float dx, float dy)
+{
+	const float z = one->z + (dx * one->zx + dy * one->zy);
+
+	return z > one->least ? z : one->least;
+}
+
+static inline void ewa_lower(uint64_t *at, float z, float near_z, uint32_t id)
+{
+	const uint64_t word = (uint64_t)psr_bits_from_float(z) << 32 | id;
+
+	if (z > near_z && word < *at)
+		*at = word;
+}
+
+static inline void ewa_draw_words(const struct warp_target *t, const struct ewa_one *one)
+{
+	struct ewa_part part;
+
+	if (!ewa_clip(&part, t, one->x, one->y, one->radius))
+		return;
+	for (int32_t y = part.y0; y < part.y1; y++) {
+		const int32_t dy = y - one->y;
+		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + one->radius - one->x;
+		uint64_t *row = t->word + (size_t)(y - t->y0) * t->stride - t->x0;
+
+		for (int32_t x = part.x0; x < part.x1; x++)
+			if (weight[x] >= one->core)
+				ewa_lower(&row[x], ewa_depth(one, (float)(x - one->x), (float)dy), t->near_z, one->id);
+	}
+}
+
+/* Adds a leaf to a pixel unless the pixel's own is nearer by more than is one surface. */
+static inline void ewa_add(struct ewa_sum *to, uint64_t word, float z, const uint32_t value[EWA_LANES], uint32_t weight)
+{
+	const int is_same = z <= psr_float_from_bits((uint32_t)(word >> 32));
+	const uint32_t w = weight & (0u - (uint32_t)(is_same & (to->lane[EWA_WEIGHT] < EWA_MOST_WEIGHT)));
+
+	for (int k = 0; k < EWA_LANES; k++)
+		to->lane[k] += w * value[k];
+}
+
+static inline void ewa_draw_sums(const struct warp_target *t, const struct ewa_one *one, float same,
+                                 const uint32_t value[EWA_LANES])
+{
+	struct ewa_part part;
+
+	if (!ewa_clip(&part, t, one->x, one->y, one->radius))
+		return;
+	for (int32_t y = part.y0; y < part.y1; y++) {
+		const int32_t dy = y - one->y;
+		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + one->radius - one->x;
+		const uint64_t *row = t->word + (size_t)(y - t->y0) * t->stride - t->x0;
+		struct ewa_sum *sum = t->sum + (size_t)(y - t->y0) * t->sum_stride - t->x0;
+
+		for (int32_t x = part.x0; x < part.x1; x++)
+			ewa_add(&sum[x], row[x], ewa_depth(one, (float)(x - one->x), (float)dy) - same, value, weight[x]);
+	}
+}
+
+/* ---- beyond the ten sizes ---- */
+
+#define EWA_CORE_SQUARE 2.7725887f /* where a Gaussian has a quarter of its peak */
+
+struct ewa_wide {
+	float u, v, xx, xy, yy; /* q at an offset: xx dx^2 + xy dx dy + yy dy^2 */
+	uint32_t peak;          /* of weights: those of narrow ones are lower as their pixels are not in them whole */
+};
+
+/* A pixel's mean of a Gaussian is much as its value in the middle of one that is wider by the box's own deviation, the
+ * square root of 1 / 12, and as much lower. */
+static inline void ewa_make_wide(struct ewa_wide *w, const struct ewa_leaves *l, uint32_t i, int32_t *radius)
+{
+	const float square = EWA_SIGMA * EWA_SIGMA, box = 1.0f / 12;
+	const float xx = square * l->across[i], yy = square * l->down[i], xy = square * l->aslant[i];
+	const float wide_x = xx + box, wide_y = yy + box, most = wide_x > wide_y ? wide_x : wide_y;
+	const float exact = xx * yy - xy * xy, plain = psr_where(exact > 0, exact); /* edge-on it is less than roundings */
+	const float area = plain + box * (xx + yy + box);
+	const float reach = __builtin_sqrtf(EWA_MOST_SQUARE * most) + 1;
+
+	w->u = l->u[i];
+	w->v = l->v[i];
+	w->xx = wide_y / area;
+	w->yy = wide_x / area;
+	w->xy = -2 * xy / area;
+	w->peak = (uint32_t)(int32_t)(255 * __builtin_sqrtf(plain / area));
+	*radius = (int32_t)(reach < PSR_MAX_SIDE ? reach : PSR_MAX_SIDE);
+}
+
+static inline float ewa_wide_square(const struct ewa_wide *w, int32_t x, int32_t y)
+{
+	const float dx = (float)x + 0.5f - w->u, dy = (float)y + 0.5f - w->v;
+
+	return (w->xx * dx * dx + w->xy * dx * dy) + w->yy * dy * dy;
+}
+
+/* At least 1 in its reach: what is seen edge-on is there, too. */
+static inline uint32_t ewa_wide_weight(const struct ewa_wide *w, float square)
+{
+	const uint32_t step = square > 0 ? (uint32_t)(int32_t)(square * EWA_STEPS) : 0;
+
+	return (w->peak * ewa_bell[step] + 255) >> 8;
+}
+
+static inline void ewa_draw_wide(const struct warp_target *t, const struct ewa_leaves *l, uint32_t i, float same,
+                                 const uint32_t value[EWA_LANES])
+{
+	struct ewa_one one = { .x = l->x[i], .y = l->y[i], .z = l->z[i], .zx = l->zx[i], .zy = l->zy[i],
+		                   .least = l->least[i], .id = l->id[i] };
+	struct ewa_wide wide;
+	struct ewa_part part;
+
+	ewa_make_wide(&wide, l, i, &one.radius);
+	if (!ewa_clip(&part, t, one.x, one.y, one.radius))
+		return;
+	for (int32_t y = part.y0; y < part.y1; y++) {
+		uint64_t *row = t->word + (size_t)(y - t->y0) * t->stride - t->x0;
+		struct ewa_sum *sum = value != NULL ? t->sum + (size_t)(y - t->y0) * t->sum_stride - t->x0 : NULL;
+
+		for (int32_t x = part.x0; x < part.x1; x++) {
+			const float square = ewa_wide_square(&wide, x, y);
+			const float z = ewa_depth(&one, (float)(x - one.x), (float)(y - one.y));
+
+			if (!(square < EWA_MOST_SQUARE))
+				continue;
+			if (value != NULL)
+				ewa_add(&sum[x], row[x], z - same, value, ewa_wide_weight(&wide, square));
+			else if (square < EWA_CORE_SQUARE)
+				ewa_lower(&row[x], z, t->near_z, one.id);
+		}
+	}
+}
+
+/* ---- kernels ---- */
+
+static uint64_t ewa_words(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	struct ewa_leaves l;
+	struct ewa_one one;
+	uint64_t n_inside = 0;
+
+	for (uint32_t e = 0; e < n; e++) {
+		ewa_place(&l, t, &entry[e]);
+		for (uint32_t i = 0; i < l.n; i++) {
+			if (!l.is_left[i])
+				continue;
+			n_inside += (uint64_t)((l.x[i] >= t->x0) & (l.x[i] < t->x1) & (l.y[i] >= t->y0) & (l.y[i] < t->y1));
+			if (l.size[i] == EWA_SIZES) {
+				ewa_draw_wide(t, &l, i, 0, NULL);
+				continue;
+			}
+			ewa_pick(&one, &l, i);
+			ewa_draw_words(t, &one);
+		}
+	}
+	return n_inside;
+}
+
+static void ewa_values(uint32_t value[EWA_LANES], const struct ewa_leaves *l, uint32_t i)
+{
+	value[EWA_WEIGHT] = 1;
+	for (int k = 0; k < 3; k++) {
+		value[EWA_NORMAL + k] = (uint32_t)l->turned[k][i];
+		value[EWA_COLOR + k] = (uint32_t)l->color[k][i];
+	}
+	value[EWA_LANES - 1] = 0;
+}
+
+static uint64_t ewa_sums(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	struct ewa_leaves l;
+	struct ewa_one one;
+	uint64_t n_inside = 0;
+
+	for (uint32_t e = 0; e < n; e++) {
+		ewa_place(&l, t, &entry[e]);
+		ewa_look(&l, t, &entry[e]);
+		for (uint32_t i = 0; i < l.n; i++) {
+			_Alignas(32) uint32_t value[EWA_LANES];
+
+			if (!l.is_left[i])
+				continue;
+			n_inside++;
+			ewa_values(value, &l, i);
+			if (l.size[i] == EWA_SIZES) {
+				ewa_draw_wide(t, &l, i, l.same, value);
+				continue;
+			}
+			ewa_pick(&one, &l, i);
+			ewa_draw_sums(t, &one, l.same, value);
+		}
+	}
+	return n_inside;
+}
+
+#endif
