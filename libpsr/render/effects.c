@@ -1,3 +1,4 @@
+#include "groups.h"
 #include "render.h"
 
 static const struct {
@@ -71,4 +72,14 @@ void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why
 {
 	report->effect[effect].why = why;
 	report->effect[effect].count = why == PSR_WHY_RAN ? count : 0;
+}
+
+void representations_note(struct psr_report *report, const struct psr_scene *scene)
+{
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		const enum psr_representation as = instance_drawn_as(&scene->instance[i]);
+
+		report->drawn_as[as].n++;
+		report->drawn_as[as].n_automatic += scene->instance[i].representation == PSR_AUTOMATIC;
+	}
 }

@@ -3,7 +3,6 @@
 #include "base/direction.h"
 #include "base/mem.h"
 #include "ewa.h"
-#include "groups.h"
 #include "planes.h"
 #include "renderer.h"
 
@@ -69,16 +68,6 @@ static void note_time(struct psr_report *report, enum psr_stage stage, uint64_t 
 	*start = end;
 }
 
-static void note_representations(struct psr_report *report, const struct psr_scene *scene)
-{
-	for (uint32_t i = 0; i < scene->n_instances; i++) {
-		const enum psr_representation as = instance_drawn_as(&scene->instance[i]);
-
-		report->drawn_as[as].n++;
-		report->drawn_as[as].n_automatic += scene->instance[i].representation == PSR_AUTOMATIC;
-	}
-}
-
 /* From the request to the z-buffer. Keeps the shadow maps of earlier frames as they are unless the frame is lit. */
 static int make_stack(struct psr_renderer *r, const struct call *call, int is_lit)
 {
@@ -98,7 +87,7 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 	if (rc)
 		return rc;
 	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
-	note_representations(report, call->scene);
+	representations_note(report, call->scene);
 	note_time(report, PSR_STAGE_PLAN, &start);
 
 	const struct shadow_call shadow = {
@@ -248,11 +237,6 @@ static int find_gaps(uint32_t *n_marked, struct psr_renderer *r, struct psr_pool
 		report->count[PSR_STAGE_GAPS] += r->buffers.gaps[i].n_partial;
 	}
 	return rc;
-}
-
-static int has_colors(const struct psr_renderer *r)
-{
-	return r->frame->rgb != NULL || r->plan.is_wide;
 }
 
 static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)

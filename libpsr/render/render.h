@@ -19,6 +19,9 @@ int render_cancelled(struct psr_error *err);
 /* Reports that an effect ran, with its count, or why it did not. */
 void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why why, uint64_t count);
 
+/* Counts the instances of a scene by what they are drawn as. */
+void representations_note(struct psr_report *report, const struct psr_scene *scene);
+
 /* For tests: replaces the kernels. */
 void renderer_use(struct psr_renderer *renderer, const struct simd *simd);
 

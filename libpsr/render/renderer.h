@@ -34,6 +34,11 @@ struct psr_renderer {
 	float *depth; /* where depths go, or NULL */
 };
 
+static inline int has_colors(const struct psr_renderer *r)
+{
+	return r->frame->rgb != NULL || r->plan.is_wide;
+}
+
 /* Sets the default rounding, as in the pool's threads; the caller restores its own by fesetenv(). */
 static inline void set_environment(fenv_t *callers)
 {

@@ -63,7 +63,7 @@ static struct psr_cubes *random_cubes(struct check *c, uint32_t n_cubes, uint32_
 		struct psr_cube_level *level = &cubes->level[l];
 
 		random_tree(c, &tree[l], run, cube + l * n_cubes, (const uint32_t[2]){ n_cubes, n_leaves });
-		*level = (struct psr_cube_level){ &tree[l], l * n_cubes, n_cubes, ldexp(2, -tree[l].levels), run };
+		*level = (struct psr_cube_level){ &tree[l], l * n_cubes, n_cubes, ldexp(2, -tree[l].levels), run, NULL };
 		for (uint32_t i = l * n_cubes; i < (l + 1) * n_cubes; i++) {
 			const uint32_t most = 1u << (tree[l].levels - 2);
 

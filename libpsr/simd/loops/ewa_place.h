@@ -7,7 +7,7 @@
 #include "psr/render.h"
 #include "simd/cube.h"
 
-/* A splat's plane is followed in depth, a pixel's step by half an edge at most: on a steeper one what a pixel holds does
+/* A splat's plane is followed in depth, a pixel's step by an edge at most: on a steeper one what a pixel holds does
  * not follow from its middle. */
 #define EWA_STEEP 1.0f
 

@@ -7,7 +7,7 @@
 /* Columns of a pixel. A column's integral is exact, and rises and falls once from one column to the next, so the mean of
  * some has an error of their number's part of the greatest. */
 #define COLUMNS 64
-#define CORE 0.25 /* of a mask's greatest weight. Measured (decision 0121) */
+#define CORE 0.25 /* of a mask's greatest weight (decision 0121) */
 
 static const struct ewa_size sizes[EWA_SIZES] = {
 	{ 0.70710678f, 0, 0 }, { 0.89089872f, 1, 0 }, { 1.1224620f, 1, 0 }, { 1.4142136f, 2, 0 }, { 1.7817974f, 2, 0 },

@@ -80,7 +80,7 @@ static void case_make(struct case_of *c, uint32_t which)
 	for (uint32_t i = 0; i < c->scene.n_instances; i++) {
 		c->instance[i] =
 			(struct psr_instance){ i ? models[random_below(&seed, MODELS)] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1,
-			                       PSR_AUTOMATIC };
+			                       PSR_AUTOMATIC, PSR_COLOR_OWN };
 		for (int k = 0; k < 3 && i; k++)
 			c->instance[i].translation[k] = random_in(&seed, -info->scale, info->scale);
 		if (i) /* a third of a turn about a diagonal */

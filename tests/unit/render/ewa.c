@@ -155,7 +155,7 @@ static void frames_are_the_same_with_any_threads_and_instructions(void **state)
 }
 
 /* Instances that change places have other slots and come in another order; where none of them meet, only that changes. */
-static void order_changes_nothing(void **state)
+static void the_order_of_instances_changes_nothing(void **state)
 {
 	struct psr_model *model = tree_build(&SOLID);
 	struct psr_instance instance[2] = { place(model), place(model) };
@@ -218,7 +218,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(spheres_have_no_holes_at_any_magnification),
 		cmocka_unit_test(frames_are_the_same_with_any_threads_and_instructions),
-		cmocka_unit_test(order_changes_nothing),
+		cmocka_unit_test(the_order_of_instances_changes_nothing),
 		cmocka_unit_test(leaves_of_one_surface_are_mixed),
 		cmocka_unit_test(discs_and_splats_exclude_each_other),
 	};
