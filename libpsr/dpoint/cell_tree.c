@@ -84,9 +84,14 @@ static void bound_normals(struct cell_node *node, const struct making *m)
 {
 	float spread2 = 0;
 
+	look_range_of(&node->looks, m->cell[m->entry[node->begin].cell].attr);
 	node->part = m->cell[m->entry[node->begin].cell].part;
 	v3f_set(node->normal, 0, 0, 0);
 	for (uint32_t e = node->begin; e < node->end; e++) {
+		struct look_range looks;
+
+		look_range_of(&looks, m->cell[m->entry[e].cell].attr);
+		look_range_join(&node->looks, &looks);
 		v3f_add(node->normal, node->normal, m->cell[m->entry[e].cell].normal);
 		if (m->cell[m->entry[e].cell].part != node->part)
 			node->part = CELL_NO_PART;

@@ -3,6 +3,7 @@
 #ifndef PSR_DPOINT_CELL_TREE_H
 #define PSR_DPOINT_CELL_TREE_H
 
+#include "look.h"
 #include "surface.h"
 
 #define CELL_NO_PART UINT32_MAX /* cells of several parts */
@@ -13,6 +14,7 @@ struct cell_node {
 	                            * beyond */
 	uint32_t begin, end;       /* of order */
 	uint32_t part;
+	struct look_range looks;   /* of cells of the surface, if spread is finite */
 };
 
 struct cell_tree {

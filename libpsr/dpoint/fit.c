@@ -8,6 +8,10 @@
 
 #define CHUNK 256    /* candidates */
 #define FIRST 0.125f /* of an extent: where growing begins */
+/* Nodes that a step of growing may look at: beyond, a rectangle stays as it is. So time is bounded. */
+#define MOST_LOOKED 2048
+#define LEAST_LOOKED 256
+#define ALL_LOOKED (1u << 27) /* shared by all candidates of a turn */
 
 /* A cell that does not suit: the rectangle has to end at `at` along u, or along v. */
 struct bar {
@@ -19,6 +23,7 @@ struct bars {
 	struct bar *bar;
 	size_t n, room;
 	float free[2]; /* half-sides of a rectangle that is known to have none */
+	int left;      /* how many nodes may still be looked at; below 0: there may be more bars */
 	int is_failed;
 };
 
@@ -27,6 +32,7 @@ struct fitting {
 	struct dpoint_candidate *candidate;
 	size_t n;
 	float overhang;
+	int looked;  /* nodes a step of growing */
 	int is_failed;
 };
 
@@ -115,6 +121,8 @@ static void search(struct bars *bars, const struct fitting *f, const struct rect
 	float p[3], a[3], b[3];
 	size_t near;
 
+	if (--bars->left < 0)
+		return;
 	rectangle_sees(p, r, node->middle);
 	if ((fabsf(p[0]) + node->radius <= bars->free[0] && fabsf(p[1]) + node->radius <= bars->free[1]) ||
 	    !(fabsf(p[0]) <= r->extent[0] + node->radius && fabsf(p[1]) <= r->extent[1] + node->radius &&
@@ -170,13 +178,16 @@ static void best_without(float extent[2], struct bars *bars, float overhang)
 	extent[1] = best[1];
 }
 
-static void look_around(struct rectangle *r, const float free_one[2], struct bars *bars, const struct fitting *f)
+/* Ends the rectangle at the bars. Returns 0 if that is not known of all of them. */
+static int look_around(struct rectangle *r, const float free_one[2], struct bars *bars, const struct fitting *f)
 {
 	memcpy(bars->free, free_one, sizeof bars->free);
 	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
 	bars->n = 0;
+	bars->left = f->looked;
 	search(bars, f, r, 0);
 	best_without(r->extent, bars, f->overhang);
+	return bars->left >= 0;
 }
 
 /* Which side the bar is on that ends an extent; 0: none does. */
@@ -188,13 +199,13 @@ static float side_of(const struct bars *bars, const float extent[2], int k)
 	return 0;
 }
 
-/* Grows along u and along v until bars are in the way, or the extents are those of epsilon and delta. side: of the
- * bars. */
+/* Grows along u and along v until bars are in the way, or too much to look at, or the extents are those of epsilon and
+ * delta. side: of the bars. */
 static void grow(float now[2], float side[2], struct rectangle *r, struct bars *bars, const struct fitting *f)
 {
 	const float most[2] = { r->extent[0], r->extent[1] };
 	/* From a square on: what a curvature makes short must not become shorter for the sake of the other side. */
-	const float first = fminf(fminf(most[0], most[1]), FIRST * fmaxf(most[0], most[1]));
+	float first = fminf(fminf(most[0], most[1]), FIRST * fmaxf(most[0], most[1]));
 	int is_growing[2] = { 1, 1 }, is_first = 1;
 
 	for (int k = 0; k < 2; k++) {
@@ -206,7 +217,12 @@ static void grow(float now[2], float side[2], struct rectangle *r, struct bars *
 
 		for (int k = 0; k < 2; k++)
 			r->extent[k] = grown[k] = is_growing[k] && !is_first ? fminf(2 * now[k], most[k]) : now[k];
-		look_around(r, is_first ? (const float[2]){ 0, 0 } : now, bars, f);
+		if (!look_around(r, is_first ? (const float[2]){ 0, 0 } : now, bars, f)) {
+			if (!is_first || first < f->overhang)
+				break;
+			now[0] = now[1] = first /= 2;
+			continue;
+		}
 		is_first = 0;
 		for (int k = 0; k < 2; k++) {
 			if (r->extent[k] < grown[k])
@@ -243,6 +259,7 @@ static void move(struct dpoint *p, const float by[2])
  * rectangle still ends there. What then is in the way makes it shorter, without another move. */
 static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitting *f)
 {
+	struct dpoint before;
 	struct rectangle r;
 	float most[2], now[2], side[2], by[2] = { 0, 0 };
 
@@ -259,10 +276,14 @@ static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitt
 	}
 	if (by[0] == 0 && by[1] == 0)
 		return;
+	before = c->point;
 	move(&c->point, by);
 	rectangle_of(&r, c, f->look.options);
 	memcpy(most, r.extent, sizeof most);
-	look_around(&r, (const float[2]){ 0, 0 }, bars, f);
+	if (!look_around(&r, (const float[2]){ 0, 0 }, bars, f)) {
+		c->point = before;
+		return;
+	}
 	for (int k = 0; k < 2; k++)
 		if (r.extent[k] < most[k] - f->overhang)
 			c->delta[k] = dpoint_delta_of_class(dpoint_delta_class(r.extent[k]));
@@ -271,7 +292,7 @@ static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitt
 static void fit_chunk(int chunk, void *userdata)
 {
 	struct fitting *f = userdata;
-	struct bars bars = { NULL, 0, 0, { 0, 0 }, 0 };
+	struct bars bars = { .bar = NULL };
 
 	for (size_t i = (size_t)chunk * CHUNK; i < f->n && i < (size_t)(chunk + 1) * CHUNK; i++)
 		fit(&f->candidate[i], &bars, f);
@@ -287,6 +308,7 @@ int fit_candidates(struct dpoint_surface *surface, const struct cell_tree *tree,
 	int rc;
 
 	f.overhang = options->overhang;
+	f.looked = (int)fmin(fmax((double)ALL_LOOKED / ((double)f.n + 1), LEAST_LOOKED), MOST_LOOKED);
 	looking_init(&f.look, surface, tree, options);
 	rc = psr_pool_for_until(work->pool, work->cancel, (int)((f.n + CHUNK - 1) / CHUNK), fit_chunk, &f);
 	return rc == PSR_OK && f.is_failed ? PSR_ERR_MEMORY : rc;

@@ -82,7 +82,7 @@ static int patch_below(struct dpoint_surface *surface, const struct tally *tally
 int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
                 const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel)
 {
-	const struct dpoint_cover_options any = { options->sine, options->slack, 1, 1, options->is_within_parts, 0 };
+	const struct dpoint_cover_options any = { options->sine, options->slack, 1, 1, options->is_within_parts, 0, 255 };
 	const struct dpoint_work work = { pool, cancel };
 	struct tally tally;
 	int rc;

@@ -33,6 +33,7 @@ void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const s
 	r->lambda_u = c->point.lambda_u;
 	r->rho = c->point.rho;
 	r->part = c->part;
+	look_of(r->look, c->point.attr);
 	dpoint_extent(r->extent, &c->point, &limit);
 	r->height = fminf(options->height, 0.5f * fminf(r->extent[0], r->extent[1]));
 	for (int k = 0; k < 2; k++)
@@ -63,8 +64,12 @@ int rectangle_suits(const struct looking *l, const struct rectangle *r, const st
                     const float at[3])
 {
 	float n[3], cell_normal[3], dot;
+	struct look_range look;
 
 	if (cell->part == DPOINT_BEYOND)
+		return 0;
+	look_range_of(&look, cell->attr);
+	if (look_range_distance(&look, r->look) > l->options->looks)
 		return 0;
 	if (!(fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])) <= r->height))
 		return 0;
@@ -99,7 +104,8 @@ int rectangle_suits_node(const struct looking *l, const struct rectangle *r, con
 	const float away = fmaxf(fabsf(p[0]), fabsf(p[1])) + node->radius;
 	float n[3], normal[3], chord;
 
-	if (node->spread >= MOST_CHORD || !(away * fabsf(r->lambda_u) <= MOST_SINE))
+	if (node->spread >= MOST_CHORD || !(away * fabsf(r->lambda_u) <= MOST_SINE) ||
+	    look_range_distance(&node->looks, r->look) > l->options->looks)
 		return 0;
 	dpoint_normal_at(n, r->lambda_u, r->rho, p[0], p[1]);
 	v3f_normalize(n, n);

@@ -20,6 +20,7 @@ struct rectangle {
 	float height;            /* how far from S_p */
 	float lambda_u, rho;
 	uint32_t part;
+	uint8_t look[LOOK_CHANNELS];
 };
 
 void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options);
@@ -30,15 +31,16 @@ void rectangle_shorten(struct rectangle *r, float slack);
 /* A place in the frame of the rectangle. */
 void rectangle_sees(float at[3], const struct rectangle *r, const float p[3]);
 
-/* Whether in the cell's middle, `at` in the rectangle's frame, height and normal are S_p's as the options say. */
+/* Whether in the cell's middle, `at` in the rectangle's frame, height and normal are S_p's, and
+ * its look is the point's, as the options say. */
 int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
                     const float at[3]);
 
 /* Whether all corners are within the extents, and the cell suits. */
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell);
 
-/* Whether all cells of a node suit, or are covered, told by its sphere, at p in the rectangle's frame, and by its normals
- * alone: 0 may be wrong. */
+/* Whether all cells of a node suit, or are covered, told by its sphere, at p in the rectangle's frame, and by its
+ * normals and looks alone: 0 may be wrong. */
 int rectangle_suits_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
                          const float p[3]);
 int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,

@@ -56,6 +56,7 @@ struct dpoint_cover_options {
 	float height;      /* S_p may be off by so much there; and by half of the shorter extent at most */
 	int is_within_parts; /* points cover cells of their own part alone, as in [K] 6 */
 	float overhang;    /* dpoint_fit(): how far a rectangle may reach over what it does not suit */
+	int looks;         /* a cell may differ from the point by so many 255ths of a channel (look.h), 0..255 */
 };
 
 /* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along
@@ -89,7 +90,7 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
                 const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel);
 
 /* Shortens each candidate's delta, along u and along v, until its rectangle is over no cell that S_p does not suit: one
- * of the surface that goes on beside it, where the normal or the height is further off than the options say. So a
+ * of the surface that goes on beside it, where normal, height or look is further off than the options say. So a
  * rectangle ends at a crease, and where curvatures change; its point may move along S_p for that. delta becomes one of
  * dpoint_delta_class(), unless it is as it was. Cells that look the other way, and those of other sheets above or
  * below, shorten nothing. MEMORY, CANCELLED. */

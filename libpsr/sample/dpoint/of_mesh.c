@@ -15,7 +15,7 @@
 #define OVERHANG 5e-4f
 #define SLACK 2e-5f       /* half a step of a place */
 #define SPARSE 4          /* of candidates that come in two turns */
-#define COLORED 0.5       /* pixels that rectangles of colours reach */
+#define LOOKS 8           /* 255ths of a channel that a cell may differ from its point */
 
 void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)
 {
@@ -30,7 +30,7 @@ struct building {
 	struct psr_model_info *info;
 	struct surface look;
 	uint8_t *two_sided; /* by material */
-	float *delta;       /* likewise */
+	double *grain;      /* likewise */
 	struct dpoint_surface surface;
 };
 
@@ -87,14 +87,11 @@ static int find_sides(struct building *b)
 	return rc;
 }
 
-static void find_deltas(struct building *b)
+/* What changes within a pixel is not seen at the resolution. */
+static void find_grains(struct building *b)
 {
-	for (uint32_t m = 0; m < b->mesh->n_materials; m++) {
-		const int is_plain = b->look.is_plain[m] && b->mesh->color == NULL;
-		const double most = is_plain ? b->options->delta : fmin(b->options->delta, 2 * COLORED / b->options->resolution);
-
-		b->delta[m] = dpoint_delta_of_class(dpoint_delta_class((float)most));
-	}
+	for (uint32_t m = 0; m < b->mesh->n_materials; m++)
+		b->grain[m] = b->look.is_plain[m] && b->mesh->color == NULL ? 0 : 2.0 / b->options->resolution;
 }
 
 static int choose(struct building *b, struct dpoint_set *set, struct dpoint_build_report *report)
@@ -102,7 +99,8 @@ static int choose(struct building *b, struct dpoint_set *set, struct dpoint_buil
 	const struct dpoint_build_options *o = b->options;
 	const struct dpoint_mesh_options mesh = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = o->piece, .delta_of = b->delta, .look = look_at, .userdata = b,
+		.cell = o->piece, .delta = dpoint_delta_of_class(dpoint_delta_class((float)o->delta)), .grain_of = b->grain,
+		.looks = LOOKS, .look = look_at, .userdata = b,
 	};
 	int rc;
 
@@ -122,7 +120,7 @@ int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, st
 {
 	const struct dpoint_cover_options cover_options = {
 		.sine = dpoint_sine(options->epsilon), .slack = SLACK, .angle = (float)(options->degrees * PSR_DEGREE),
-		.height = (float)options->height, .overhang = OVERHANG,
+		.height = (float)options->height, .overhang = OVERHANG, .looks = LOOKS,
 	};
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
@@ -182,14 +180,14 @@ int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct d
 		return rc;
 	dpoint_surface_init(&b.surface);
 	b.two_sided = calloc(mesh->n_materials, 1);
-	b.delta = calloc(mesh->n_materials, sizeof *b.delta);
+	b.grain = calloc(mesh->n_materials, sizeof *b.grain);
 	rc = surface_init(&b.look, mesh, info->scale);
-	if (rc == PSR_OK && b.two_sided != NULL && b.delta != NULL)
+	if (rc == PSR_OK && b.two_sided != NULL && b.grain != NULL)
 		rc = find_sides(&b);
 	else
 		rc = PSR_ERR_MEMORY;
 	if (rc == PSR_OK)
-		find_deltas(&b);
+		find_grains(&b);
 	rc = rc == PSR_OK ? choose(&b, set, report)
 	                  : psr_fail(err, rc, "no memory for a surface of %u triangles", mesh->n_triangles);
 	if (rc == PSR_OK)
@@ -197,6 +195,6 @@ int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct d
 	surface_fini(&b.look);
 	dpoint_surface_fini(&b.surface);
 	free(b.two_sided);
-	free(b.delta);
+	free(b.grain);
 	return rc;
 }

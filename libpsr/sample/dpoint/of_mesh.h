@@ -31,10 +31,11 @@ struct dpoint_build_report {
 };
 
 /* Chooses points of a mesh's triangles, in inner units of `info`, whose origin, scale, box, spacing and resolution it
- * fills in. Rectangles end at creases, borders, and where the mesh bends otherwise than they do; those of materials with
- * textures, or of meshes with colours at their vertices, reach over half a pixel of the resolution. Alpha-tested places
- * that are not there have no points; surfaces of BLEND materials have those of opaque ones. A closed surface is seen from
- * its outside alone, another one as its materials say. The caller calls dpoint_set_fini(), on failure too.
+ * fills in. Rectangles end at creases, borders, and where the mesh bends otherwise than they do. Where textures
+ * (filtered over a pixel of the resolution) or colours at vertices change they end as well: at cells whose look differs
+ * from their point's by more than 8 255ths of a channel, but for an overhang of 5e-4. Alpha-tested places that are not
+ * there have no points; surfaces of BLEND materials have those of opaque ones. A closed surface is seen from its
+ * outside alone, another one as its materials say. The caller calls dpoint_set_fini(), on failure too.
  *
  * ARG: options out of range, no triangles; FORMAT: nothing is opaque; LIMIT, MEMORY. */
 int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct dpoint_build_report *report,

@@ -123,7 +123,7 @@ static void choose_all(struct dpoint_surface *surface, struct dpoint_cover *cove
  * grows and once as its point moves, but for its tilt. A candidate that mends a hole reaches over by its cell. */
 static void no_extent_crosses_an_edge(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.01), 1e-5f, 0.05f, 0.005f, 0, OVERHANG };
+	const struct dpoint_cover_options options = { dpoint_sine(0.01), 1e-5f, 0.05f, 0.005f, 0, OVERHANG, 0 };
 	struct grid_mesh *m = malloc(sizeof *m);
 
 	(void)state;
@@ -172,7 +172,7 @@ static void no_extent_crosses_an_edge(void **state)
 /* After the fit, what is under a rectangle suits it: normals are within the angle wherever the surface goes on. */
 static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.2), 1e-5f, 0.06f, 0.01f, 0, OVERHANG };
+	const struct dpoint_cover_options options = { dpoint_sine(0.2), 1e-5f, 0.06f, 0.01f, 0, OVERHANG, 0 };
 	struct dpoint_surface surface;
 	struct revolved torus;
 	size_t n = 0;
@@ -218,7 +218,7 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 
 static void two_turns_cover_all_with_little_more(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.03), 1e-5f, 0.06f, 0.01f, 0, OVERHANG };
+	const struct dpoint_cover_options options = { dpoint_sine(0.03), 1e-5f, 0.06f, 0.01f, 0, OVERHANG, 0 };
 	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0, 0 };
 	struct revolved torus;
 	size_t n_kept[2];
@@ -246,7 +246,7 @@ static void two_turns_cover_all_with_little_more(void **state)
 static void mending_leaves_no_hole(void **state)
 {
 	/* Extents of 0.02 r where candidates are 0.1 r apart. */
-	const struct dpoint_cover_options options = { 0.02f, 1e-5f, 0.05f, 0.001f, 0, 0 };
+	const struct dpoint_cover_options options = { 0.02f, 1e-5f, 0.05f, 0.001f, 0, 0, 0 };
 	struct grid_mesh *m = malloc(sizeof *m);
 	struct dpoint_surface surface;
 	struct dpoint_cover cover;
@@ -286,6 +286,35 @@ static void too_many_pieces_are_refused(void **state)
 	free(m);
 }
 
+/* The counts are those of the header, and nothing was cut. */
+static void what_is_too_much_is_refused_before_it_is_cut(void **state)
+{
+	const struct limit {
+		double cell, grain;
+		const char *says;
+	} limit[] = { { 1.4143 / 4097, 0, "a side of" }, { 1.4143 / 1500, 0, "pieces" }, { 1, 1.4143 / 4096, "looked at" } };
+	struct grid_mesh *m = malloc(sizeof *m);
+
+	(void)state;
+	assert_non_null(m);
+	cube_mesh(m);
+	memcpy(m->triangle[12], m->triangle[0], 12 * sizeof *m->triangle);
+	m->mesh.n_triangles = 24;
+	for (size_t i = 0; i < sizeof limit / sizeof *limit; i++) {
+		const struct dpoint_mesh_options options = { .scale = 1, .cell = limit[i].cell, .delta = 0.1f,
+			                                         .grain_of = &limit[i].grain };
+		struct dpoint_surface surface;
+		struct psr_error err = { 0 };
+
+		dpoint_surface_init(&surface);
+		assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &options, &err), PSR_ERR_LIMIT);
+		assert_non_null(strstr(err.text, limit[i].says));
+		assert_int_equal(surface.n_cells, 0);
+		dpoint_surface_fini(&surface);
+	}
+	free(m);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -295,6 +324,7 @@ int main(void)
 		cmocka_unit_test(two_turns_cover_all_with_little_more),
 		cmocka_unit_test(mending_leaves_no_hole),
 		cmocka_unit_test(too_many_pieces_are_refused),
+		cmocka_unit_test(what_is_too_much_is_refused_before_it_is_cut),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,227 @@
+#include "cut.h"
+
+#include <math.h>
+#include <string.h>
+#include "base/direction.h"
+#include "base/vec.h"
+#include "look.h"
+
+/* The corners' weights of the place that is x and y grains from the apex along its sides. */
+static void weigh(double weight[3], const struct cutting *c, double x, double y)
+{
+	const double unit = 1.0 / ((double)c->n * c->grains);
+
+	weight[(c->apex + 1) % 3] = x * unit;
+	weight[(c->apex + 2) % 3] = y * unit;
+	weight[c->apex] = 1 - (x + y) * unit;
+}
+
+static void place_at(double at[3], const struct cutting *c, const double weight[3])
+{
+	v3d_scale(at, c->corner[0]->at, weight[0]);
+	v3d_add_scaled(at, at, weight[1], c->corner[1]->at);
+	v3d_add_scaled(at, at, weight[2], c->corner[2]->at);
+}
+
+/* A basis whose x follows the triangle's side: on a flat face rectangles then lie along its edges. */
+static void basis_along(double axis[3][3], const struct cutting *c, const double normal[3])
+{
+	double along[3];
+
+	psr_direction_basis(normal, axis);
+	v3d_sub(along, c->corner[(c->side + 1) % 3]->at, c->corner[c->side]->at);
+	v3d_add_scaled(along, along, -v3d_dot(along, normal), normal);
+	if (v3d_normalize(along, along) == 0)
+		return;
+	memcpy(axis[0], along, sizeof along);
+	v3d_cross(axis[1], axis[2], axis[0]);
+}
+
+/* Between the corners: the normal that shading has, and the mean of their second forms, seen in its tangent plane. */
+static int local_at(struct dpoint_local *local, const struct cutting *c, const double weight[3])
+{
+	double t[6] = { 0 }, normal[3] = { 0, 0, 0 }, along[2][3];
+
+	place_at(local->at, c, weight);
+	for (int i = 0; i < 3; i++) {
+		v3d_add_scaled(normal, normal, weight[i], c->corner[i]->normal);
+		for (int k = 0; k < 6; k++)
+			t[k] += weight[i] * c->corner[i]->tensor[k];
+	}
+	if (v3d_normalize(normal, normal) == 0)
+		return 0;
+	basis_along(local->axis, c, normal);
+	for (int i = 0; i < 2; i++) {
+		const double *a = local->axis[i];
+
+		along[i][0] = t[0] * a[0] + t[1] * a[1] + t[2] * a[2];
+		along[i][1] = t[1] * a[0] + t[3] * a[1] + t[4] * a[2];
+		along[i][2] = t[2] * a[0] + t[4] * a[1] + t[5] * a[2];
+	}
+	local->shape[0] = v3d_dot(along[0], local->axis[0]);
+	local->shape[1] = v3d_dot(along[0], local->axis[1]);
+	local->shape[2] = v3d_dot(along[1], local->axis[1]);
+	return 1;
+}
+
+/* A piece begins x and y grains from the apex, and its two sides are `size` long; a triangle if it reaches the longest
+ * side. */
+struct piece {
+	uint32_t x, y, size;
+};
+
+static int is_triangle(const struct cutting *c, const struct piece *p)
+{
+	return p->x + p->y + p->size == c->n * c->grains;
+}
+
+static void weigh_middle(double weight[3], const struct cutting *c, const struct piece *p)
+{
+	const double half = p->size * (is_triangle(c, p) ? 1.0 / 3 : 0.5);
+
+	weigh(weight, c, p->x + half, p->y + half);
+}
+
+static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
+{
+	static const uint32_t square[4][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } };
+	static const uint32_t triangle[4][2] = { { 0, 0 }, { 1, 0 }, { 0, 1 }, { 0, 1 } };
+	const uint32_t (*corner)[2] = is_triangle(c, p) ? triangle : square;
+	const float delta = c->options->delta;
+	struct dpoint_candidate like = { .delta = { delta, delta }, .part = c->material, .point.attr = attr };
+	struct dpoint_cell *cell = dpoint_surface_cell(c->surface);
+	struct dpoint_local local;
+	double weight[3], place[3];
+	int is_good;
+
+	if (cell == NULL)
+		return PSR_ERR_MEMORY;
+	for (int i = 0; i < 4; i++) {
+		weigh(weight, c, p->x + corner[i][0] * p->size, p->y + corner[i][1] * p->size);
+		place_at(place, c, weight);
+		for (int k = 0; k < 3; k++)
+			cell->corner[i][k] = (float)place[k];
+	}
+	memset(cell->normal, 0, sizeof cell->normal);
+	cell->part = c->material;
+	cell->attr = attr;
+	weigh_middle(weight, c, p);
+	is_good = local_at(&local, c, weight);
+	for (int k = 0; k < 3 && is_good; k++)
+		cell->normal[k] = (float)local.axis[2][k];
+	like.cell = (uint32_t)c->surface->n_cells - 1;
+	return dpoint_surface_put(c->surface, is_good ? &local : NULL, &like);
+}
+
+/* How a piece looks. */
+struct seen {
+	enum { SEEN_BEYOND, SEEN_EVEN, SEEN_UNEVEN } kind; /* beyond: beyond the longest side; uneven: all of it is put */
+	int is_absent;           /* an even piece: there is no surface */
+	struct look_range range; /* of one that is there */
+};
+
+static int look_at(struct seen *seen, const struct cutting *c, const struct piece *p)
+{
+	double weight[3];
+	uint64_t attr = 0;
+
+	weigh_middle(weight, c, p);
+	*seen = (struct seen){ .kind = SEEN_EVEN };
+	if (c->options->look != NULL)
+		seen->is_absent = !c->options->look(c->options->userdata, c->triangle, weight[1], weight[2], &attr);
+	look_range_of(&seen->range, attr);
+	return PSR_OK;
+}
+
+static int put_seen(const struct cutting *c, const struct piece *p, const struct seen *seen)
+{
+	if (seen->kind != SEEN_EVEN || seen->is_absent)
+		return PSR_OK;
+	return put(c, p, look_range_middle(&seen->range));
+}
+
+/* Whether all quarters are even, and look like one piece. */
+static int join(struct seen *all, const struct seen quarter[4], int most)
+{
+	*all = quarter[0];
+	for (int i = 1; i < 4 && all->kind == SEEN_EVEN; i++) {
+		if (quarter[i].kind == SEEN_BEYOND)
+			continue;
+		if (quarter[i].kind == SEEN_UNEVEN || quarter[i].is_absent != all->is_absent)
+			all->kind = SEEN_UNEVEN;
+		look_range_join(&all->range, &quarter[i].range);
+	}
+	if (!all->is_absent && look_range_width(&all->range) > most)
+		all->kind = SEEN_UNEVEN;
+	return all->kind == SEEN_EVEN;
+}
+
+/* Looks at a piece grain by grain, and puts the largest parts of it that look even, unless it does so itself. */
+static int gather(struct seen *seen, const struct cutting *c, const struct piece *p)
+{
+	const uint32_t half = p->size / 2;
+	struct seen quarter[4];
+	struct piece part[4];
+	int rc = PSR_OK;
+
+	if (p->x + p->y + p->size > c->n * c->grains) {
+		*seen = (struct seen){ .kind = SEEN_BEYOND };
+		return PSR_OK;
+	}
+	if (half == 0)
+		return look_at(seen, c, p);
+	for (uint32_t i = 0; i < 4 && rc == PSR_OK; i++) {
+		part[i] = (struct piece){ p->x + (i & 1) * half, p->y + (i >> 1) * half, half };
+		rc = gather(&quarter[i], c, &part[i]);
+	}
+	if (rc != PSR_OK || join(seen, quarter, c->options->looks))
+		return rc;
+	for (int i = 0; i < 4 && rc == PSR_OK; i++)
+		rc = put_seen(c, &part[i], &quarter[i]);
+	return rc;
+}
+
+int cut(const struct cutting *c)
+{
+	int rc = PSR_OK;
+
+	for (uint32_t i = 0; i < c->n; i++)
+		for (uint32_t j = 0; i + j < c->n && rc == PSR_OK; j++) {
+			const struct piece piece = { i * c->grains, j * c->grains, c->grains };
+			struct seen seen;
+
+			rc = gather(&seen, c, &piece);
+			if (rc == PSR_OK)
+				rc = put_seen(c, &piece, &seen);
+		}
+	return rc;
+}
+
+double cut_plan(struct cutting *c, unsigned is_open)
+{
+	const double cell = c->options->cell, grain = c->options->grain_of != NULL ? c->options->grain_of[c->material] : 0;
+	double most = 0, followed = -1, n;
+
+	c->side = c->apex = 0;
+	for (int i = 0; i < 3; i++) {
+		double along[3], length, rank;
+
+		v3d_sub(along, c->corner[(i + 1) % 3]->at, c->corner[i]->at);
+		length = v3d_length(along);
+		rank = length + (is_open >> i & 1 ? 1e30 : 0);
+		if (length > most) {
+			most = length;
+			c->apex = (i + 2) % 3;
+		}
+		if (rank > followed) {
+			followed = rank;
+			c->side = i;
+		}
+	}
+	n = fmax(ceil(most / cell), 1);
+	c->n = (uint32_t)fmin(n, CUT_MOST_PARTS);
+	c->grains = 1;
+	while (grain > 0 && c->n * c->grains < CUT_MOST_PARTS && most / ((double)c->n * c->grains) > 1.5 * grain)
+		c->grains *= 2;
+	return grain > 0 ? fmax(n, ceil(most / (3 * grain))) : n;
+}

@@ -1,0 +1,28 @@
+/* A triangle to pieces: cells, and a candidate in the middle of each. */
+#ifndef PSR_DPOINT_CUT_H
+#define PSR_DPOINT_CUT_H
+
+#include "corners.h"
+#include "mesh.h"
+
+#define CUT_MOST_PARTS 4096 /* of a side */
+
+struct cutting {
+	struct dpoint_surface *surface;
+	const struct dpoint_mesh_options *options;
+	const struct corner *corner[3];
+	uint32_t triangle, material;
+	uint32_t n, grains;  /* parts of each side, and how many grains each has: a power of two */
+	int apex;            /* the corner that is opposite of the longest side */
+	int side;            /* the one that directions follow where any would do */
+};
+
+/* Tells the rest of `c` from its corners, triangle and material. A side in `is_open` (bits) is followed first. Returns
+ * in how many parts the longest side would have to be cut, which may be more than CUT_MOST_PARTS. */
+double cut_plan(struct cutting *c, unsigned is_open);
+
+/* Adds the pieces: parallelograms along the two shorter sides, and triangles along the longest one. Where looks differ
+ * they are quarters, and so on down to grains. MEMORY. */
+int cut(const struct cutting *c);
+
+#endif
