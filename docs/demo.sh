@@ -64,8 +64,8 @@ sheet=
 for name in teapot top pencil wheel $real; do
 	report=$out/$name.json
 	# The first picture of a model reads it from the disk.
-	shot --model "$name" --size $size --codec jpeg:90 -o "$out/$name.png"
-	shot --model "$name" --size $size --codec jpeg:90 --report "$report" -o "$out/$name.png"
+	shot --model "$name" --quality good --size $size --codec jpeg:90 -o "$out/$name.png"
+	shot --model "$name" --quality good --size $size --codec jpeg:90 --report "$report" -o "$out/$name.png"
 	shot --model "$name" --size 320x240 --background '#f4f4f0' --quality best -o "$out/$name-small.png"
 	psr bench --server "$server" --model "$name" --clients 4 --seconds "$seconds" --size $size --json >"$out/$name-bench.json"
 	printf '%-10s %8.0f %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f %7.1f %8.1f\n' "$name" "$(of_model "$report" samples)" \
