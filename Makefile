@@ -392,7 +392,7 @@ $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 .PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cancel bench-codec bench-daemon bench-effects bench-model bench-octree bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
-# PSR_TEST names tests as tests/run does; only what they run is built. Scripts run programs of tests/tools and tests/soak.
+# PSR_TEST names tests as tests/run does; only what they run is built. Scripts run programs of tests/tools and soak.
 ifneq ($(and $(PSR_TEST),$(filter check,$(MAKECMDGOALS))),)
 NAMED := $(shell for t in $(TEST_BIN:$(BUILD)/tests/%=%) $(patsubst tests/%.sh,%,$(wildcard tests/e2e/*.sh)); do \
 	case $$t in ($(PSR_TEST)) echo $$t ;; esac; done)

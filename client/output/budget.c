@@ -82,16 +82,19 @@ void budget_add(cJSON *report, const struct psr_msg_frame *asked, const struct p
 static void print_price(const char *what, const struct psr_msg_frame_end *end, unsigned id)
 {
 	struct price price;
+	int smooth;
 
 	if (!find_price(&price, end, id))
 		return;
+	smooth = price.settings.smooth;
 	fprintf(stderr, "%s ", what);
 	if (price.settings.pass > 0)
 		fprintf(stderr, "pass %u", price.settings.pass);
 	else if (price.settings.scale > 1)
 		fprintf(stderr, "scale %u", price.settings.scale);
 	else
-		fprintf(stderr, "spacing %g%s", price.settings.spacing_px, price.settings.smooth == PSR_SMOOTH_FINE ? ", fine" : price.settings.smooth ? ", smooth" : "");
+		fprintf(stderr, "spacing %g%s", price.settings.spacing_px,
+		        smooth == PSR_SMOOTH_FINE ? ", fine" : smooth ? ", smooth" : "");
 	fprintf(stderr, " for %.3g ms", price.ms);
 	if (!isnan(price.db))
 		fprintf(stderr, " and %.1f dB", price.db);

@@ -26,8 +26,8 @@ int quality_is_said(const struct quality_wish *wish); /* any of these options wa
 /* Sets size, settings or budget, passes and colour codec of the request. ARG, LIMIT. */
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);
 
-/* With the planes in the request: a fine picture that nobody named is a good one where a server with these capabilities,
- * enum psr_cap, cannot draw it. */
+/* With the planes in the request: a fine picture that nobody named is a good one where a server with these
+ * capabilities, enum psr_cap, cannot draw it. */
 void quality_settle(struct psr_msg_frame *frame, const struct quality_wish *wish, uint64_t capabilities);
 
 #define QUALITY_BUDGET_TEXT 40

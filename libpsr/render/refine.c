@@ -290,7 +290,8 @@ static int same_outline(const struct render_settings *a, const struct render_set
 {
 	return a->width == b->width && a->height == b->height && a->spacing_px == b->spacing_px
 	       && a->cull_tests == b->cull_tests && a->is_full == b->is_full && a->with_splats == b->with_splats
-	       && a->with_ewa == b->with_ewa && a->gap_threshold == b->gap_threshold && a->gap_method == b->gap_method && a->cell_bias == b->cell_bias;
+	       && a->with_ewa == b->with_ewa && a->gap_threshold == b->gap_threshold && a->gap_method == b->gap_method
+	       && a->cell_bias == b->cell_bias;
 }
 
 /* Notes what a still's is_inside depends on. *has_changed: it differs from what was noted before. */

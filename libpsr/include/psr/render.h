@@ -16,8 +16,8 @@ extern "C" {
 
 #define PSR_MAX_PASS 4
 
-/* FINE: draws 2x2 sub-pixels a pixel, each as EDGES would draw it in a picture of twice the size, and gives each pixel the
- * mean of their light and the least of their depths. Takes five times as long, and draws colour and depth only. */
+/* FINE: draws 2x2 sub-pixels a pixel, each as EDGES would draw it in a picture of twice the size, and gives each pixel
+ * the mean of their light and the least of their depths. Takes five times as long, and draws colour and depth only. */
 enum psr_smooth { PSR_SMOOTH_NONE = 0, PSR_SMOOTH_EDGES = 1, PSR_SMOOTH_FINE = 2 };
 
 struct psr_settings {
@@ -49,8 +49,8 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 /* Draws the planes of the frame that are not NULL. The caller owns them (psr_frame_alloc()); their size must be that of
  * the settings. pool NULL: draws in the caller's thread alone. Fills frame->report with times and counts; in passes
  * above 0 these count sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for
- * planes other than colour and depth in passes above 0 and fine pictures. A failure leaves the planes undefined, and has no effect on the
- * renderer's next frame. */
+ * planes other than colour and depth in passes above 0 and fine pictures. A failure leaves the planes undefined, and has
+ * no effect on the renderer's next frame. */
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);
 
