@@ -1,6 +1,7 @@
 #include <dlfcn.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,7 +32,7 @@ static int find_beside(char path[MOST_PATH], const char *file)
 	return 0;
 }
 
-int module_load(const void **out, const struct module_kind *kind, struct psr_error *err)
+static int load(const void **out, const struct module *kind, struct psr_error *err)
 {
 	const char *chosen = getenv(kind->variable);
 	char path[MOST_PATH];
@@ -62,5 +63,18 @@ int module_load(const void **out, const struct module_kind *kind, struct psr_err
 		dlclose(handle);
 	else
 		*out = found;
+	return rc;
+}
+
+int module_open(const void **out, struct module *module, struct psr_error *err)
+{
+	static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+	int rc = PSR_OK;
+
+	pthread_mutex_lock(&lock);
+	if (module->loaded == NULL)
+		rc = load(&module->loaded, module, err);
+	*out = module->loaded;
+	pthread_mutex_unlock(&lock);
 	return rc;
 }
