@@ -149,7 +149,7 @@ is "psr says why" "blocks     drawn: 1 instance, since the model has blocks, the
 	"$(shot --model both --effects -o "$work/both.ppm" 2>/dev/null | head -n 1)"
 is "and of an octree how many levels suffice" \
 	"octree     drawn: 1 instance, since the scene says so; 5 of 7 levels suffice" \
-	"$(psr shot --server "$server" --size 24x24 --instance both,as=octree --effects --report "$work/named.json" \
+	"$(psr shot --server "$server" --size 24x24 --quality good --instance both,as=octree --effects --report "$work/named.json" \
 	-o "$work/named.ppm" 2>/dev/null | head -n 1)"
 is "which the report has, too" "5 7 0" "$(for of in levels of_levels automatic; do
 	value "$work/named.json" drawn_as.octree.$of; done | paste -sd " ")"
