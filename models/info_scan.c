@@ -6,8 +6,8 @@
 /* As the ASPRS numbers them (LAS 1.4, table 17). */
 static const char *const class_names[] = {
 	"never classified", "unclassified", "ground", "low vegetation", "medium vegetation", "high vegetation", "building",
-	"low noise", "reserved", "water", "rail", "road", "reserved", "wire guard", "wire", "tower", "wire connector", "bridge",
-	"high noise",
+	"low noise", "reserved", "water", "rail", "road", "reserved", "wire guard", "wire", "tower", "wire connector",
+	"bridge", "high noise",
 };
 
 static const char *class_name(unsigned class)

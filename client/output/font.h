@@ -8,7 +8,8 @@
 #define FONT_ROWS 8     /* the last one is below the base line */
 #define FONT_ADVANCE 6  /* from a character to the next */
 
-/* Returns FONT_ROWS rows from the top; of each, bit FONT_COLUMNS - 1 is the leftmost pixel. Other characters are blank. */
+/* Returns FONT_ROWS rows from the top; of each, bit FONT_COLUMNS - 1 is the leftmost pixel. Other characters are
+ * blank. */
 const uint8_t *font_glyph(char c);
 
 #endif

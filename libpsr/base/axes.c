@@ -30,8 +30,8 @@ static void rotate(double m[3][3], double v[3][3], int p, int q)
 	}
 }
 
-/* Off-diagonal elements shrink quadratically: three sweeps nearly always suffice, and below 1e-12 of the trace they turn
- * no axis by a float's precision. */
+/* Off-diagonal elements shrink quadratically: three sweeps nearly always suffice, and below 1e-12 of the trace they
+ * turn no axis by a float's precision. */
 void axes_find(double m[3][3], double v[3][3])
 {
 	const double least = 1e-12 * (m[0][0] + m[1][1] + m[2][2]);

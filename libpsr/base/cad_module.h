@@ -28,8 +28,8 @@ struct cad_module_mesh {
 	char first_left_out[128]; /* the first one's number, and its part's name; printable */
 };
 
-/* The types of the module's functions. Reads a file; *out is the caller's, for the function below. FORMAT, LIMIT, MEMORY;
- * then `message` says why, in a few words. */
+/* The types of the module's functions. Reads a file; *out is the caller's, for the function below. FORMAT, LIMIT,
+ * MEMORY; then `message` says why, in a few words. */
 typedef int cad_module_read(struct cad_module_mesh **out, const struct cad_module_source *source, char *message,
                             unsigned message_size);
 typedef void cad_module_destroy(struct cad_module_mesh *mesh); /* NULL is fine */

@@ -1,4 +1,5 @@
-/* Modules: shared objects that are loaded when somebody first needs them, so that nobody else pays for their libraries. */
+/* Modules: shared objects that are loaded when somebody first needs them, so that nobody else pays for their
+ * libraries. */
 #ifndef PSR_BASE_MODULE_H
 #define PSR_BASE_MODULE_H
 

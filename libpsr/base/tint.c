@@ -3,8 +3,9 @@
 
 void psr_ramp_color(uint8_t rgb[3], unsigned step)
 {
-	static const uint8_t knot[9][3] = { { 68, 1, 84 }, { 72, 40, 120 }, { 59, 82, 139 }, { 44, 114, 142 }, { 33, 145, 140 },
-		                                { 40, 174, 128 }, { 94, 201, 98 }, { 173, 220, 48 }, { 253, 231, 37 } };
+	static const uint8_t knot[9][3] = { { 68, 1, 84 }, { 72, 40, 120 }, { 59, 82, 139 }, { 44, 114, 142 },
+		                                { 33, 145, 140 }, { 40, 174, 128 }, { 94, 201, 98 }, { 173, 220, 48 },
+		                                { 253, 231, 37 } };
 	const unsigned most = PSR_RAMP - 1, at = (step < most ? step : most) * 8, k = at / most < 8 ? at / most : 7;
 	const unsigned part = at - k * most;
 

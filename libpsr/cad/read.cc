@@ -119,7 +119,8 @@ void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_
 		if (c == nullptr)
 			c = entity_color.Seek(it.Current().Located(TopLoc_Location()));
 		n_faces++;
-		if (triangles.add(TopoDS::Face(it.Current().Moved(location)), c != nullptr ? static_cast<uint32_t>(*c) : inherited))
+		if (triangles.add(TopoDS::Face(it.Current().Moved(location)),
+		                  c != nullptr ? static_cast<uint32_t>(*c) : inherited))
 			continue;
 		if (n_left_out++ == 0)
 			first_left_out = std::to_string(n_faces) + " of part \"" + name_of(label) + "\"";

@@ -29,8 +29,8 @@ struct cad_triangles {
 	std::vector<uint32_t> color_of;
 	uint64_t max_triangles;
 
-	// Appends a face that has been meshed, with its location. Returns false, and appends nothing, if it has no triangles.
-	// Throws cad_failure LIMIT.
+	// Appends a face that has been meshed, with its location. Returns false, and appends nothing, if it has no
+	// triangles. Throws cad_failure LIMIT.
 	bool add(const TopoDS_Face &face, uint32_t color);
 
 	// Makes normals of vertices at one place equal where they nearly are: across smooth joints of faces.

@@ -20,8 +20,8 @@ static int check_tint(const struct psr_instance *instance, unsigned i, struct ps
 	if (by == PSR_COLOR_OWN || by == PSR_COLOR_HEIGHT || (by == PSR_COLOR_INTENSITY && scan->has_intensity)
 	    || (by == PSR_COLOR_CLASS && scan->has_class) || (by == PSR_COLOR_RETURN && scan->has_return))
 		return PSR_OK;
-	return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: its %s no %s of a scan; an octree has them that psr-model build "
-	                "--scan made of a LAS file that tells them. Any model can be coloured by height", i,
+	return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: its %s no %s of a scan; an octree has them that psr-model "
+	                "build --scan made of a LAS file that tells them. Any model can be coloured by height", i,
 	                cubes != NULL ? "octree keeps" : "representation has", names[by]);
 }
 

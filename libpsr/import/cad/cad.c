@@ -49,8 +49,8 @@ static int check_step(const struct import_mesh *im, const uint8_t *bytes, size_t
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: not a STEP file: it does not begin with ISO-10303-21;", im->path);
 	if (memmem(bytes + n_bytes - tail, tail, "END-ISO-10303-21;", 17) == NULL)
 		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: the STEP file ends in the middle: END-ISO-10303-21; is missing after %zu bytes; export it again",
-		                im->path, n_bytes);
+		                "%s: the STEP file ends in the middle: END-ISO-10303-21; is missing after %zu bytes; export it "
+		                "again", im->path, n_bytes);
 	return PSR_OK;
 }
 
@@ -65,7 +65,8 @@ static int check_iges(const struct import_mesh *im, const uint8_t *bytes, size_t
 	while (at + SECTION < n_bytes) {
 		const uint8_t *end = memchr(bytes + at, '\n', n_bytes - at);
 		const size_t next = end != NULL ? (size_t)(end - bytes) + 1 : n_bytes;
-		const char *section = next - at > SECTION && bytes[at + SECTION] != 0 ? strchr(letter, bytes[at + SECTION]) : NULL;
+		const int letter_here = next - at > SECTION ? bytes[at + SECTION] : 0;
+		const char *section = letter_here != 0 ? strchr(letter, letter_here) : NULL;
 
 		if (section == NULL)
 			break;
@@ -75,8 +76,9 @@ static int check_iges(const struct import_mesh *im, const uint8_t *bytes, size_t
 		at = next;
 	}
 	if (counted[0] == 0)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: not an IGES file in lines of %d bytes: column %d of the first has no S",
-		                im->path, CARD, SECTION + 1);
+		return psr_fail(err, PSR_ERR_FORMAT,
+		                "%s: not an IGES file in lines of %d bytes: column %d of the first has no S", im->path, CARD,
+		                SECTION + 1);
 	if (counted[4] == 0)
 		return psr_fail(err, PSR_ERR_FORMAT,
 		                "%s: the IGES file ends in the middle: its last line, of section T, is missing after %zu bytes;"
@@ -86,8 +88,9 @@ static int check_iges(const struct import_mesh *im, const uint8_t *bytes, size_t
 		                im->path);
 	for (int i = 0; i < 4; i++)
 		if (told[i] != counted[i])
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: section %c of the IGES file has %llu lines, and its last line tells %llu",
-			                im->path, letter[i], counted[i], told[i]);
+			return psr_fail(err, PSR_ERR_FORMAT,
+			                "%s: section %c of the IGES file has %llu lines, and its last line tells %llu", im->path,
+			                letter[i], counted[i], told[i]);
 	return PSR_OK;
 }
 
@@ -153,11 +156,12 @@ int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 	rc = cad_module_open(&module, &why);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc,
-		                "%s: %s; STEP and IGES are read through Open CASCADE: install libocct-data-exchange-dev and build psr"
-		                " again, or convert the file to glTF or STL", im->path, why.text);
+		                "%s: %s; STEP and IGES are read through Open CASCADE: install libocct-data-exchange-dev and "
+		                "build psr again, or convert the file to glTF or STL", im->path, why.text);
 	rc = module->read(&cad, &source, message, sizeof message);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%s: the %s file cannot be read: %s", im->path, source.is_iges ? "IGES" : "STEP", message);
+		return psr_fail(err, rc, "%s: the %s file cannot be read: %s", im->path, source.is_iges ? "IGES" : "STEP",
+		                message);
 	rc = take(im, cad, err);
 	module->destroy(cad);
 	return rc;

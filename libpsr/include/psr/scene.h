@@ -20,8 +20,8 @@ extern "C" {
 #define PSR_MAX_LIGHTS 32
 
 /* How a model is drawn. Automatic: as blocks if it has any, else as an octree if it has one, else as differential
- * points. Blocks are nearest to the truth, and of closed surfaces the fastest (`psr-study octree`; octrees of plants are
- * faster). A choice by what a view needs would have pictures jump while the camera moves. */
+ * points. Blocks are nearest to the truth, and of closed surfaces the fastest (`psr-study octree`; octrees of plants
+ * are faster). A choice by what a view needs would have pictures jump while the camera moves. */
 enum psr_representation { PSR_AUTOMATIC, PSR_BLOCKS, PSR_OCTREE, PSR_DPOINTS };
 
 /* world = translation + scale * rotate(rotation, object) */

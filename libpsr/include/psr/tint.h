@@ -1,4 +1,5 @@
-/* Colours that tell a number of each point instead of its own colour: of what a laser scan measured, or of its height. */
+/* Colours that tell a number of each point instead of its own colour: of what a laser scan measured, or of its
+ * height. */
 #ifndef PSR_TINT_H
 #define PSR_TINT_H
 
@@ -8,8 +9,8 @@
 extern "C" {
 #endif
 
-/* INTENSITY: the ramp, from psr_scan.low to high. CLASS: psr_class_color(). HEIGHT: the ramp, from the bottom to the top of
- * the model's box along its way up. RETURN: psr_order_color(). */
+/* INTENSITY: the ramp, from psr_scan.low to high. CLASS: psr_class_color(). HEIGHT: the ramp, from the bottom to the
+ * top of the model's box along its way up. RETURN: psr_order_color(). */
 enum psr_color_by { PSR_COLOR_OWN, PSR_COLOR_INTENSITY, PSR_COLOR_CLASS, PSR_COLOR_HEIGHT, PSR_COLOR_RETURN };
 
 /* Which one of the returns of its pulse a point is: the only one, the first, one between, the last. */
@@ -25,8 +26,8 @@ struct psr_scan {
 
 #define PSR_RAMP 256 /* colours of the ramp */
 
-/* Sets the sRGB of step 0..PSR_RAMP - 1 of a ramp that rises evenly in lightness, from dark violet to yellow (viridis of
- * Smith and van der Walt, through nine of its colours). */
+/* Sets the sRGB of step 0..PSR_RAMP - 1 of a ramp that rises evenly in lightness, from dark violet to yellow (viridis
+ * of Smith and van der Walt, through nine of its colours). */
 void psr_ramp_color(uint8_t rgb[3], unsigned step);
 
 /* The classes of ASPRS LAS 1.4. Names are "reserved" or "user" where it leaves them open; never NULL. */
@@ -41,7 +42,9 @@ static inline enum psr_return_order psr_return_order(uint8_t returns)
 {
 	const unsigned number = returns & 15, n = returns >> 4;
 
-	return n <= 1 ? PSR_RETURN_ONLY : number <= 1 ? PSR_RETURN_FIRST : number < n ? PSR_RETURN_BETWEEN : PSR_RETURN_LAST;
+	if (n <= 1)
+		return PSR_RETURN_ONLY;
+	return number <= 1 ? PSR_RETURN_FIRST : number < n ? PSR_RETURN_BETWEEN : PSR_RETURN_LAST;
 }
 
 #ifdef __cplusplus

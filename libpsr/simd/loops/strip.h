@@ -5,6 +5,7 @@
 #include "base/srgb.h"
 #include "points.h"
 #include "strip_parts.h"
+#include "strip_write.h"
 
 static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
@@ -54,7 +55,8 @@ static void find_leaves(struct strip_pixels *p, const struct warp_instance *in, 
 	for (uint32_t i = first; i < end; i++) {
 		const uint32_t cube = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot;
 		const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
-		const uint32_t rank = psr_cubes_rank(level->tree, psr_cubes_code(cubes, level, cube), p->id[i] % PSR_BLOCK_SAMPLES);
+		const uint32_t rank = psr_cubes_rank(level->tree, psr_cubes_code(cubes, level, cube),
+		                                     p->id[i] % PSR_BLOCK_SAMPLES);
 
 		tree[i] = level->tree;
 		leaf[i] = psr_cubes_leaf(cubes, level, cube) + rank;
@@ -352,56 +354,4 @@ static void strip_color(struct strip *strip, const float ambient[3], int is_wide
 		strip_color_by(strip, ambient, 0, 1);
 	else
 		strip_color_by(strip, ambient, 0, 0);
-}
-
-static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)
-{
-	const uint16_t *const from[3] = { strip->r, strip->g, strip->b };
-	uint16_t *const to[3] = { target->r, target->g, target->b };
-	const struct strip_pixels *p = strip->pixels;
-	const size_t first = (size_t)p->y * target->width + p->x0;
-
-	for (int c = 0; c < 3; c++) {
-		uint16_t row[STRIP];
-
-		for (uint32_t x = 0; x < n; x++)
-			row[x] = target->background[c];
-		for (uint32_t i = 0; i < p->n; i++)
-			row[p->x[i]] = from[c][i];
-		for (uint32_t x = 0; x < n; x += STRIP_BRICK)
-			if (target->wants[x / STRIP_BRICK])
-				memcpy(to[c] + first + x, row + x, 2 * (n - x < STRIP_BRICK ? n - x : STRIP_BRICK));
-	}
-}
-
-static inline void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
-{
-	const struct strip_pixels *p = strip->pixels;
-
-	if (target->rgb) {
-		const uint16_t *empty = target->background;
-		uint8_t *to = target->rgb + 3 * ((size_t)p->y * target->width + p->x0);
-		uint32_t pixel[STRIP];
-
-		for (uint32_t x = 0; x < n; x++)
-			pixel[x] = pixel_of(target->srgb, empty[0], empty[1], empty[2]);
-		for (uint32_t i = 0; i < p->n; i++)
-			pixel[p->x[i]] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
-		for (uint32_t x = 0; x + 1 < n; x++) /* writes a byte of the next pixel, too */
-			memcpy(to + 3 * (size_t)x, &pixel[x], 4);
-		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
-	}
-	if (target->wants)
-		write_linear(strip, target, n);
-}
-
-/* Two factors, since 2^exponent may not fit a float: exact unless the result does not fit. */
-static void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
-{
-	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
-	const float first = psr_float_from_bits((uint32_t)(127 + half) << 23);
-	const float second = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
-
-	for (uint32_t i = 0; i < n; i++)
-		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * first * second;
 }

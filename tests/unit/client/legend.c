@@ -117,8 +117,10 @@ static void small_pictures_and_many_classes_are_safe(void **state)
 
 static void a_frame_tells_what_the_legend_has(void **state)
 {
-	static struct psr_msg_frame_end end = { .n_entries = 2, .entry = { { .id = PSR_WIRE_REPORT_INTENSITIES,
-	                                        .count = 7 | 900 << 16 }, { .id = PSR_WIRE_REPORT_CLASSES + 1, .count = 5 } } };
+	static struct psr_msg_frame_end end = {
+		.n_entries = 2, .entry = { { .id = PSR_WIRE_REPORT_INTENSITIES, .count = 7 | 900 << 16 },
+		                           { .id = PSR_WIRE_REPORT_CLASSES + 1, .count = 5 } },
+	};
 	static struct scene_model model[2] = { { .opened = { .up = { 0, 0, 1 }, .box_min = { 0, 0, 3 },
 	                                                    .box_max = { 1, 1, 8 } } } };
 	uint32_t model_of[2] = { 0, 0 };

@@ -30,8 +30,9 @@ static struct psr_mesh *read_pins(const char *path, uint32_t resolution)
 	return mesh;
 }
 
-/* Corners are within `edge` mm of the surface, which is the tolerance of its edges, and middles of sides within an eighth of
- * a pixel, of 70 / 256 mm. Normals are the surface's, of radius 10 mm, at a place as near to the corner, and floats. */
+/* Corners are within `edge` mm of the surface, which is the tolerance of its edges, and middles of sides within an
+ * eighth of a pixel, of 70 / 256 mm. Normals are the surface's, of radius 10 mm, at a place as near to the corner, and
+ * floats. */
 static void check_pins(const char *path, double edge)
 {
 	struct psr_mesh *mesh = read_pins(path, 256);
@@ -68,8 +69,8 @@ static void check_pins(const char *path, double edge)
 		assert_true(fabsf(material->base_color[0] - 0.5f) < 0.01f && fabsf(material->base_color[2] - 0.125f) < 0.01f);
 		assert_true(material->base_color[3] == 1 && material->alpha == PSR_ALPHA_OPAQUE);
 	}
-	/* Of polygons of at least 30 sides (0.2 radians): at most 1 - cos(pi / 30) = 0.6 % of a cylinder's side less, and 0.8 %
-	 * of its ends. */
+	/* Of polygons of at least 30 sides (0.2 radians): at most 1 - cos(pi / 30) = 0.6 % of a cylinder's side less, and
+	 * 0.8 % of its ends. */
 	assert_true(area > 2 * 600 * M_PI * 0.992 && area < 2 * 600 * M_PI);
 	assert_true(mesh->up[2] == 1);
 	psr_mesh_destroy(mesh);

@@ -1,5 +1,5 @@
-/* Differential points as pictures: spheres without holes, at true depths and with true normals, however large; from both
- * sides, in shadow maps, refined, beside blocks, and always the same. */
+/* Differential points as pictures: spheres without holes, at true depths and with true normals, however large; from
+ * both sides, in shadow maps, refined, beside blocks, and always the same. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
@@ -11,6 +11,7 @@
 #include "base/vec.h"
 #include "render/render.h"
 #include "render/stages.h"
+#include "tests/unit/lib/lines.h"
 #include "tests/unit/lib/points.h"
 
 #define SIDE 256
@@ -120,41 +121,6 @@ static struct drawn *draw(const struct psr_scene *scene, unsigned pass)
 
 /* ---- the truth ---- */
 
-/* A line of sight of a camera that looks at the origin. */
-struct line {
-	double from[3], along[3]; /* along: 1 along the view axis */
-};
-
-static struct line line_of(const struct psr_camera *camera, double x, double y)
-{
-	double axis[3][3];
-	struct line line;
-	const double right = x - SIDE / 2.0, down = y - SIDE / 2.0;
-
-	v3d_scale(axis[2], camera->eye, -1);
-	v3d_normalize(axis[2], axis[2]);
-	v3d_cross(axis[0], axis[2], camera->up);
-	v3d_normalize(axis[0], axis[0]);
-	v3d_cross(axis[1], axis[2], axis[0]);
-	memcpy(line.from, camera->eye, sizeof line.from);
-	memcpy(line.along, axis[2], sizeof line.along);
-	const double pixel = camera->kind == PSR_CAMERA_PERSPECTIVE ? 2 * tan(camera->fov_y / 2) / SIDE
-	                                                            : camera->ortho_height / SIDE;
-	double *moved = camera->kind == PSR_CAMERA_PERSPECTIVE ? line.along : line.from;
-	v3d_add_scaled(moved, moved, right * pixel, axis[0]);
-	v3d_add_scaled(moved, moved, down * pixel, axis[1]);
-	return line;
-}
-
-/* Returns z' where the line meets a sphere about the origin first; INFINITY: nowhere. */
-static double meet_sphere(const struct line *line, double radius)
-{
-	const double a = v3d_dot(line->along, line->along), b = v3d_dot(line->from, line->along);
-	const double c = v3d_dot(line->from, line->from) - radius * radius, inside = b * b - a * c;
-
-	return inside >= 0 ? (-b - sqrt(inside)) / a : INFINITY;
-}
-
 struct errors {
 	unsigned n_inside, n_holes, n_stray;
 	double depth, degrees, mean_degrees; /* depth: along the normal; degrees: worst */
@@ -168,7 +134,7 @@ static struct errors compare(const struct psr_camera *camera, const struct drawn
 
 	for (int y = 0; y < SIDE; y++)
 		for (int x = 0; x < SIDE; x++) {
-			const struct line line = line_of(camera, x + 0.5, y + 0.5);
+			const struct line line = line_of(camera, SIDE, x + 0.5, y + 0.5);
 			const double z = (double)p->depth[y * SIDE + x];
 			double at[3], normal[3], along[3];
 
@@ -288,8 +254,8 @@ static void backs_are_seen_of_two_sided_groups_alone(void **state)
 	for (int is_both = 0; is_both < 2; is_both++) {
 		const struct psr_instance instance = place(is_both ? model : sphere);
 		const struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 },
-			                             .camera = { .eye = { 0.1, 0.2, 0.3 }, .target = { 0, 0, -1 }, .up = { 0, 1, 0 },
-			                                         .fov_y = 1.8 } };
+			                             .camera = { .eye = { 0.1, 0.2, 0.3 }, .target = { 0, 0, -1 },
+			                                         .up = { 0, 1, 0 }, .fov_y = 1.8 } };
 		struct drawn *p = draw(&scene, 0);
 
 		for (int i = 0; i < SIDE * SIDE; i++) {
@@ -366,7 +332,7 @@ static void points_cast_shadows_and_receive_them(void **state)
 
 	for (int y = 0; y < SIDE; y++)
 		for (int x = 0; x < SIDE; x++) {
-			const struct line line = line_of(&scene.camera, x + 0.5, y + 0.5);
+			const struct line line = line_of(&scene.camera, SIDE, x + 0.5, y + 0.5);
 			const double t = -line.from[2] / line.along[2], r = 0.4 * RADIUS;
 			double at[3], from[3], gap;
 

@@ -17,6 +17,12 @@
 /* A leaf's edge, and half a pixel for where its middle falls. */
 #define SLACK (2.0 / 128 + HEIGHT / SIDE)
 
+/* A sphere whose leaves have all that a scan tells. */
+static struct psr_model *scanned(void)
+{
+	return tree_build(&(struct tree_options){ .levels = 7, .radius = RADIUS, .with_scan = 1, .keep = 1 });
+}
+
 struct scene_of {
 	struct psr_instance instance;
 	struct psr_light light;
@@ -26,7 +32,8 @@ struct scene_of {
 static void look(struct scene_of *s, const struct psr_model *model, enum psr_color_by by)
 {
 	*s = (struct scene_of){ .instance = { .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1, .color_by = by } };
-	s->light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .color = { 1, 0.2, 0.5 }, .direction = { 1, -1, -1 } };
+	s->light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .color = { 1, 0.2, 0.5 },
+		                           .direction = { 1, -1, -1 } };
 	s->scene = (struct psr_scene){ .instance = &s->instance, .n_instances = 1, .light = &s->light,
 		                           .camera = { .eye = { 0, 0, 4 }, .up = { 0, 1, 0 }, .kind = PSR_CAMERA_ORTHOGRAPHIC,
 		                                       .ortho_height = HEIGHT } };
@@ -95,7 +102,8 @@ static int is_right(const uint8_t rgb[3], double x, double y, enum psr_color_by 
 
 	if (by == PSR_COLOR_HEIGHT)
 		return is_on_ramp(rgb, y, RADIUS);
-	/* The ends of the range leave out a fiftieth of the leaves each: of a sphere, caps of a twenty-fifth of the radius. */
+	/* The ends of the range leave out a fiftieth of the leaves each: of a sphere, caps of a twenty-fifth of the
+	 * radius. */
 	if (by == PSR_COLOR_INTENSITY)
 		return is_on_ramp(rgb, y, RADIUS * 0.96);
 	if (by == PSR_COLOR_RETURN) {
@@ -139,7 +147,7 @@ static void check(const struct psr_model *model, enum psr_color_by by)
 
 static void each_pixel_has_the_colour_of_its_number(void **state)
 {
-	struct psr_model *model = tree_build(&(struct tree_options){ .levels = 7, .radius = RADIUS, .with_scan = 1, .keep = 1 });
+	struct psr_model *model = scanned();
 
 	(void)state;
 	for (int by = PSR_COLOR_INTENSITY; by <= PSR_COLOR_RETURN; by++)
@@ -150,7 +158,7 @@ static void each_pixel_has_the_colour_of_its_number(void **state)
 /* From so far away that a level of averaged attributes is drawn: still two colours. */
 static void coarse_levels_have_classes(void **state)
 {
-	struct psr_model *model = tree_build(&(struct tree_options){ .levels = 7, .radius = RADIUS, .with_scan = 1, .keep = 1 });
+	struct psr_model *model = scanned();
 	uint8_t one[3], other[3];
 	struct psr_frame frame;
 	struct scene_of s;
@@ -175,7 +183,7 @@ static void coarse_levels_have_classes(void **state)
 /* The mean of the same colours is the same colour: inside of the upper half of a sphere of one return. */
 static void passes_keep_colours(void **state)
 {
-	struct psr_model *model = tree_build(&(struct tree_options){ .levels = 7, .radius = RADIUS, .with_scan = 1, .keep = 1 });
+	struct psr_model *model = scanned();
 	struct psr_frame frame;
 	struct scene_of s;
 	uint8_t only[3];
@@ -231,8 +239,8 @@ static void palettes_are_whole(void **state)
 		uint8_t rgb[3];
 
 		psr_ramp_color(rgb, step);
-		const unsigned light = (unsigned)(1e6f * (0.2126f * psr_srgb_to_linear[rgb[0]] + 0.7152f * psr_srgb_to_linear[rgb[1]]
-		                                          + 0.0722f * psr_srgb_to_linear[rgb[2]]));
+		const float r = psr_srgb_to_linear[rgb[0]], g = psr_srgb_to_linear[rgb[1]], b = psr_srgb_to_linear[rgb[2]];
+		const unsigned light = (unsigned)(1e6f * (0.2126f * r + 0.7152f * g + 0.0722f * b));
 		assert_true(light >= last);
 		last = light;
 	}
