@@ -94,7 +94,8 @@ static void layout_opened(struct wire *w, void *p)
 	struct psr_msg_opened *m = p;
 
 	wire_u32(w, &m->handle);
-	wire_u16(w, &m->representations);
+	wire_u8(w, &m->representations);
+	wire_u8(w, &m->colors);
 	wire_u8(w, &m->octree_levels);
 	wire_u8(w, &m->of_levels);
 	wire_bytes(w, m->content_id, sizeof m->content_id);
@@ -134,6 +135,8 @@ static int check_opened(const void *p, struct psr_error *err)
 	if (m->representations == 0 || (m->representations & 1u << PSR_WIRE_REP_AUTO))
 		return psr_fail(err, PSR_ERR_ARG, "a model's representations are %#x: one is needed, and bit 0 is none",
 		                m->representations);
+	if (m->colors & 1u << PSR_WIRE_COLOR_OWN)
+		return psr_fail(err, PSR_ERR_ARG, "a model's colours are %#x: bit 0, its own, is left out", m->colors);
 	if (!(fabs(up[0] * up[0] + up[1] * up[1] + up[2] * up[2] - 1) <= 1e-6))
 		return psr_fail(err, PSR_ERR_ARG, "a model's way up (%g, %g, %g) is not a unit vector", up[0], up[1], up[2]);
 	for (int i = 0; i < 3; i++)

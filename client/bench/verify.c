@@ -109,6 +109,8 @@ static void make_scene(struct psr_scene *scene, struct artist *artist, const str
 		memcpy(to->translation, from->translation, sizeof to->translation);
 		to->scale = from->scale;
 		to->model = artist->model[kind->model[i]];
+		to->representation = (enum psr_representation)from->representation; /* both enums have the wire's order */
+		to->color_by = (enum psr_color_by)from->color_by;
 	}
 	for (uint32_t i = 0; i < msg->n_lights; i++)
 		psr_msg_light_get(&artist->light[i], &msg->light[i]);

@@ -61,10 +61,34 @@ static void find_heights(struct legend *legend, const struct psr_msg_opened *mod
 	}
 }
 
+int legend_find_of(struct legend *legend, enum psr_color_by by, const struct psr_msg_opened *model,
+                   const struct psr_msg_frame_end *end)
+{
+	uint64_t bits;
+
+	*legend = (struct legend){ .by = by };
+	if (by == PSR_COLOR_OWN || (by == PSR_COLOR_HEIGHT && model == NULL))
+		return 0;
+	if (by == PSR_COLOR_INTENSITY) {
+		if (!find_entry(end, PSR_WIRE_REPORT_INTENSITIES, &bits))
+			return 0;
+		legend->low = (double)(bits & 0xffff);
+		legend->high = (double)(bits >> 16 & 0xffff);
+	}
+	if (by == PSR_COLOR_HEIGHT)
+		find_heights(legend, model);
+	for (unsigned k = 0; k < 4; k++)
+		find_entry(end, PSR_WIRE_REPORT_CLASSES + k, &legend->classes[k]);
+	find_entry(end, PSR_WIRE_REPORT_RETURNS, &bits);
+	legend->orders = (unsigned)bits;
+	return 1;
+}
+
 int legend_find(struct legend *legend, const struct scene *scene, const struct psr_msg_frame_end *end)
 {
+	enum psr_color_by all = PSR_COLOR_OWN;
 	uint32_t model = 0;
-	uint64_t bits;
+	int has_others = 0;
 
 	*legend = (struct legend){ .by = PSR_COLOR_OWN };
 	for (uint32_t i = 0; i < scene->msg.n_instances; i++) {
@@ -72,24 +96,13 @@ int legend_find(struct legend *legend, const struct scene *scene, const struct p
 
 		if (by == PSR_COLOR_OWN)
 			continue;
-		if (legend->by != PSR_COLOR_OWN && (by != legend->by || (by == PSR_COLOR_HEIGHT && scene->model_of[i] != model)))
+		if (all != PSR_COLOR_OWN && by != all)
 			return 0;
-		legend->by = by;
+		has_others |= all != PSR_COLOR_OWN && scene->model_of[i] != model;
+		all = by;
 		model = scene->model_of[i];
 	}
-	if (legend->by == PSR_COLOR_INTENSITY) {
-		if (!find_entry(end, PSR_WIRE_REPORT_INTENSITIES, &bits))
-			return 0;
-		legend->low = (double)(bits & 0xffff);
-		legend->high = (double)(bits >> 16 & 0xffff);
-	}
-	if (legend->by == PSR_COLOR_HEIGHT)
-		find_heights(legend, &scene->model[model].opened);
-	for (unsigned k = 0; k < 4; k++)
-		find_entry(end, PSR_WIRE_REPORT_CLASSES + k, &legend->classes[k]);
-	find_entry(end, PSR_WIRE_REPORT_RETURNS, &bits);
-	legend->orders = (unsigned)bits;
-	return legend->by != PSR_COLOR_OWN;
+	return legend_find_of(legend, all, has_others ? NULL : &scene->model[model].opened, end);
 }
 
 /* ---- rows of swatches ---- */
@@ -148,12 +161,12 @@ static void list_ticks(struct table *table, const struct legend *legend)
 
 static void fill(const struct canvas *canvas, const uint32_t at[2], const uint32_t size[2], const uint8_t rgb[3])
 {
-	const uint32_t s = canvas->scale;
+	const uint32_t s = canvas->scale, left = canvas->left + at[0] * s, top = canvas->top + at[1] * s;
+	uint8_t *first = canvas->rgb + 3 * ((size_t)top * canvas->width + left);
 
 	for (uint32_t y = 0; y < size[1] * s; y++)
 		for (uint32_t x = 0; x < size[0] * s; x++)
-			memcpy(canvas->rgb + 3 * ((size_t)(canvas->top + at[1] * s + y) * canvas->width + canvas->left + at[0] * s + x),
-			       rgb, 3);
+			memcpy(first + 3 * ((size_t)y * canvas->width + x), rgb, 3);
 }
 
 static void draw_plate(const struct canvas *canvas, const uint32_t size[2])

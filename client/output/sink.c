@@ -3,7 +3,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "budget.h"
 #include "effects.h"
 #include "legend.h"
@@ -121,10 +123,22 @@ static int send(struct sink *sink, uint32_t k, const struct psr_event *event, st
 	return sink->kind == SINK_ANIMATION ? animate(sink, k, event->picture, err) : PSR_OK;
 }
 
+/* Of files whose colours are read as numbers. */
+static int is_data(const char *name)
+{
+	static const char *const endings[] = { "npy", "exr", "hdr" };
+
+	for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++)
+		if (strcasecmp(outfile_ending(name), endings[i]) == 0)
+			return 1;
+	return 0;
+}
+
 /* The same with a legend, if the picture is to have one: in a copy, since reports are of the server's picture. */
 static int send_with_legend(struct sink *sink, uint32_t k, const struct psr_event *event, struct psr_error *err)
 {
-	const int is_plain = sink->kind != SINK_NONE && sink->show == NULL && sink->wish->plane_text == NULL;
+	const int is_plain = sink->kind != SINK_NONE && sink->show == NULL && sink->wish->plane_text == NULL
+	                     && !is_data(sink->wish->output);
 	const size_t bytes = 3 * (size_t)event->picture->width * event->picture->height;
 	struct psr_frame picture = *event->picture;
 	struct psr_event copy = *event;

@@ -43,6 +43,9 @@ int scene_add_model(struct scene_wish *wish, const char *name, struct psr_error 
 void scene_add_model_options(struct optlist *list, struct scene_wish *wish);
 void scene_add_light_options(struct optlist *list, struct scene_wish *wish);
 
+/* Reads what --color-by says, an enum psr_wire_color. NULL: OWN. ARG. */
+int scene_color_parse(uint8_t *by, const char *text, struct psr_error *err);
+
 /* Reads the scene file and checks the options together. */
 int scene_check(struct scene_wish *wish, struct psr_error *err);
 

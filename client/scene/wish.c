@@ -160,19 +160,27 @@ static int read_file(struct scene_wish *wish, struct psr_error *err)
 
 const char *const scene_colors[5] = { "", "intensity", "class", "height", "return" };
 
+int scene_color_parse(uint8_t *by, const char *text, struct psr_error *err)
+{
+	*by = PSR_WIRE_COLOR_OWN;
+	if (text == NULL)
+		return PSR_OK;
+	*by = PSR_WIRE_COLOR_RETURN;
+	while (*by > PSR_WIRE_COLOR_OWN && strcmp(scene_colors[*by], text) != 0)
+		--*by;
+	return *by != PSR_WIRE_COLOR_OWN
+	               ? PSR_OK
+	               : psr_fail(err, PSR_ERR_ARG, "--color-by is intensity, class, height or return, not '%.40s'", text);
+}
+
 static int apply_colors(struct scene_wish *wish, struct psr_error *err)
 {
-	uint8_t by = PSR_WIRE_COLOR_RETURN;
+	uint8_t by;
+	const int code = scene_color_parse(&by, wish->color_by, err);
 
-	if (wish->color_by == NULL)
-		return PSR_OK;
-	while (by > PSR_WIRE_COLOR_OWN && strcmp(scene_colors[by], wish->color_by) != 0)
-		by--;
-	if (by == PSR_WIRE_COLOR_OWN)
-		return psr_fail(err, PSR_ERR_ARG, "--color-by is intensity, class, height or return, not '%.40s'", wish->color_by);
-	for (uint32_t i = 0; i < wish->n_instances; i++)
+	for (uint32_t i = 0; code == PSR_OK && wish->color_by != NULL && i < wish->n_instances; i++)
 		wish->instance[i].place.color_by = by;
-	return PSR_OK;
+	return code;
 }
 
 int scene_check(struct scene_wish *wish, struct psr_error *err)

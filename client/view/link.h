@@ -14,6 +14,7 @@ struct link;
 struct link_instance { /* world = translation + scale * rotate(rotation, object), as struct psr_msg_instance */
 	char model[PSR_WIRE_MAX_NAME + 1];
 	double rotation[4], translation[3], scale;
+	uint8_t representation, color_by; /* enum psr_wire_rep, psr_wire_color */
 };
 
 /* link_wish_default() sets what is said here; models, camera and size are the caller's to set. */
@@ -62,6 +63,7 @@ struct link_picture {
 	                              * wish is. Nothing better comes, but finer refinement */
 	int is_final;                /* and nothing at all comes until the wish changes, or finer models are there */
 	int is_coarse;               /* they are to come, or models that are missing in it */
+	uint8_t color_by;            /* enum psr_wire_color of all instances; OWN: they differ, too */
 	struct psr_msg_frame_begin begin; /* codec, settings, level of refinement */
 	struct psr_msg_frame_end end;     /* what ran, times, error bound */
 	uint64_t bytes;              /* of its messages */

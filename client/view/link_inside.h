@@ -92,12 +92,16 @@ struct link_request {        /* one that was sent */
 	int is_rest, is_direct;  /* is_direct: without loss from its first frame on */
 	int is_smooth;           /* as wished */
 	int is_coarse;           /* as in struct link_content */
+	uint8_t color_by;        /* as in struct link_picture */
 	int is_cancelled;        /* by link_view_cancel() */
 };
 
 struct link_place {          /* of one instance of the scene */
 	uint32_t handle, index;  /* into the wish's instances */
 };
+
+/* What colours all instances of the wish; OWN if that differs. */
+uint8_t link_color_by(const struct link_wish *wish);
 
 /* What pace is to know of the wish; `capabilities`: enum psr_cap. */
 void link_pace_wish(struct pace_wish *out, const struct link_wish *wish, uint64_t capabilities);

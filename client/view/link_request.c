@@ -124,6 +124,14 @@ void link_frame(struct psr_msg_frame *frame, struct pace_request *request, const
 	frame->settings = *settings;
 }
 
+uint8_t link_color_by(const struct link_wish *wish)
+{
+	for (uint32_t i = 1; i < wish->n_instances; i++)
+		if (wish->instance[i].color_by != wish->instance[0].color_by)
+			return PSR_WIRE_COLOR_OWN;
+	return wish->n_instances > 0 ? wish->instance[0].color_by : PSR_WIRE_COLOR_OWN;
+}
+
 void link_scene_message(struct psr_msg_scene *scene, const struct link_wish *wish, const struct link_place *place,
                         uint32_t n, const struct psr_camera *camera)
 {
@@ -136,6 +144,8 @@ void link_scene_message(struct psr_msg_scene *scene, const struct link_wish *wis
 		struct psr_msg_instance *to = &scene->instance[i];
 
 		to->handle = place[i].handle;
+		to->representation = from->representation;
+		to->color_by = from->color_by;
 		memcpy(to->rotation, from->rotation, sizeof to->rotation);
 		memcpy(to->translation, from->translation, sizeof to->translation);
 		to->scale = from->scale;

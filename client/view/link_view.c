@@ -118,7 +118,7 @@ static int send_frame(struct link_view *view, const struct link_content *content
 	*request = (struct link_request){
 		.id = id, .wish = content->number, .sent_ns = now_ns, .width = content->wish->width,
 		.height = content->wish->height, .is_rest = asked->is_sharp, .is_smooth = content->wish->is_smooth != 0,
-		.is_coarse = content->is_coarse,
+		.is_coarse = content->is_coarse, .color_by = link_color_by(content->wish),
 		.is_direct = asked->is_sharp && !(frame.flags & PSR_WIRE_FRAME_SHARP),
 	};
 	if (request->is_direct) /* what it costs says nothing about the next JPEG */
@@ -240,6 +240,7 @@ static void hand_over(struct link_view *view, const struct link_request *request
 	picture->is_sharp = is_sharp(request, event->begin);
 	picture->is_final = picture->is_sharp && event->end->is_final;
 	picture->is_coarse = request->is_coarse;
+	picture->color_by = request->color_by;
 	picture->begin = *event->begin;
 	picture->end = *event->end;
 	picture->bytes = event->bytes;

@@ -33,6 +33,10 @@ int link_wish_check(const struct link_wish *wish)
 	for (uint32_t i = 0; i < wish->n_instances; i++)
 		if (wish->instance[i].model[0] == '\0' || memchr(wish->instance[i].model, 0, PSR_WIRE_MAX_NAME + 1) == NULL)
 			return PSR_ERR_ARG;
+	for (uint32_t i = 0; i < wish->n_instances; i++)
+		if (wish->instance[i].representation > PSR_WIRE_REP_DPOINT
+		    || wish->instance[i].color_by > PSR_WIRE_COLOR_RETURN)
+			return PSR_ERR_ARG;
 	if (!is_in(wish->overscan, 1, 2) || !is_in(wish->spacing_px, 0x1p-6, 0x1p6) || !is_in(wish->fps, 1, 1000)
 	    || !is_in(wish->ambient, 0, PSR_WIRE_MAX_INTENSITY))
 		return PSR_ERR_ARG;
@@ -60,7 +64,8 @@ static int is_same_light(const struct psr_msg_light *a, const struct psr_msg_lig
 static int is_same_place(const struct link_instance *a, const struct link_instance *b)
 {
 	return strcmp(a->model, b->model) == 0 && memcmp(a->rotation, b->rotation, sizeof a->rotation) == 0
-	       && memcmp(a->translation, b->translation, sizeof a->translation) == 0 && a->scale == b->scale;
+	       && memcmp(a->translation, b->translation, sizeof a->translation) == 0 && a->scale == b->scale
+	       && a->representation == b->representation && a->color_by == b->color_by;
 }
 
 int link_wish_is_same(const struct link_wish *a, const struct link_wish *b)

@@ -4,6 +4,7 @@
 #include <string.h>
 #include "base/clock.h"
 #include "base/vec.h"
+#include "client/output/legend.h"
 #include "lens.h"
 
 struct view_show {
@@ -13,6 +14,7 @@ struct view_show {
 	struct psr_frame out;
 	struct psr_camera camera; /* of what was drawn last */
 	double take_ms;
+	int is_stage;             /* the picture's colours are a stage's */
 };
 
 int view_show_create(struct view_show **out, int n_threads, struct psr_error *err)
@@ -83,6 +85,7 @@ int view_show_take(struct view_show *show, struct link_picture *picture, const s
 	}
 	link_release(show->picture);
 	show->picture = picture;
+	show->is_stage = stage != NULL;
 	show->take_ms = (double)(clock_ns() - start_ns) * 1e-6;
 	return PSR_OK;
 }
@@ -104,6 +107,17 @@ const struct psr_frame *view_show_draw(struct view_show *show, const struct psr_
 	shown->is_exact = shown->warp.is_copy;
 	shown->take_ms = show->take_ms;
 	return &show->out;
+}
+
+void view_show_legend(struct view_show *show, const struct link_scene *scene)
+{
+	const struct psr_msg_opened *model = scene != NULL && scene->n_models == 1 ? &scene->model[0].opened : NULL;
+	const struct link_picture *picture = show->picture;
+	struct legend legend;
+
+	if (picture != NULL && show->out.rgb != NULL && !show->is_stage
+	    && legend_find_of(&legend, (enum psr_color_by)picture->color_by, model, &picture->end))
+		legend_draw(&legend, show->out.rgb, show->out.width, show->out.height);
 }
 
 /* ---- what is at a place ---- */

@@ -30,6 +30,10 @@ const struct link_picture *view_show_picture(const struct view_show *show);
 const struct psr_frame *view_show_draw(struct view_show *show, const struct psr_camera *camera, uint32_t width,
                                        uint32_t height, struct view_shown *shown, struct psr_error *err);
 
+/* Draws the legend of the picture's colours (client/output/legend.h) onto what view_show_draw() gave last, if they have
+ * one: not those of a stage. scene: its models; NULL: not known, and heights have none. */
+void view_show_legend(struct view_show *show, const struct link_scene *scene);
+
 /* A place of the picture drawn last, in pixels from its top left corner, as the present camera sees it. */
 struct view_probe {
 	int has_surface;   /* 0: nothing else is set */

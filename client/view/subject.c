@@ -14,6 +14,7 @@ static void set_instance(struct subject_instance *to, const struct instance_wish
 	memcpy(to->link.rotation, wish->place.rotation, sizeof to->link.rotation);
 	memcpy(to->link.translation, wish->place.translation, sizeof to->link.translation);
 	to->link.scale = wish->place.scale;
+	to->link.representation = wish->place.representation;
 	to->is_plain = wish->text == NULL;
 	snprintf(to->text, sizeof to->text, "%s", wish->text != NULL ? wish->text : wish->model);
 }
@@ -254,8 +255,10 @@ void subject_wish(const struct subject *subject, struct link_wish *wish, struct 
 {
 	const uint16_t shadow = subject->is_shadowed ? PSR_WIRE_LIGHT_SHADOW : 0;
 
-	for (uint32_t i = 0; i < subject->n_instances; i++)
+	for (uint32_t i = 0; i < subject->n_instances; i++) {
 		instance[i] = subject->instance[i].link;
+		instance[i].color_by = subject->color_by;
+	}
 	wish->instance = instance;
 	wish->n_instances = subject->n_instances;
 	wish->has_key_light = subject->has_key_light;
@@ -346,6 +349,8 @@ char *subject_command(const struct subject *subject, const struct hand *hand, co
 		put_word(to, file);
 	for (uint32_t i = 0; i < subject->n_instances; i++)
 		put_option(to, subject->instance[i].is_plain ? "model" : "instance", subject->instance[i].text);
+	if (subject->color_by != PSR_WIRE_COLOR_OWN)
+		put_option(to, "color-by", scene_colors[subject->color_by]);
 	fprintf(to, " --size %ux%u", hand->width, hand->height);
 	put_vector(to, "eye", pose->eye);
 	put_vector(to, "target", pose->target);

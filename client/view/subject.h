@@ -31,6 +31,7 @@ struct subject {
 	int has_key_light, is_shadowed, wants_lights; /* wants_lights: all of the model, once it is open */
 	double ambient;
 	uint8_t background[3];
+	uint8_t color_by;            /* of all instances: enum psr_wire_color */
 	double spacing;
 	int is_smooth;
 	uint16_t passes;
@@ -74,6 +75,15 @@ int subject_turn_instance(struct subject *subject, const struct link_scene *scen
                           const double by[2], struct psr_error *err);
 int subject_scale_instance(struct subject *subject, const struct link_scene *scene, uint32_t k, double factor,
                            struct psr_error *err);
+
+/* ---- subject_color.c: colours that tell a number of each point ---- */
+
+/* Whether each of these models can be coloured by this number; what a server does not tell: by heights alone. */
+int subject_has_color(const struct link_scene *scene, uint8_t color_by);
+/* Colours by the next number that the models have, and after the last one as they are. scene NULL: as they are. */
+void subject_next_color(struct subject *subject, const struct link_scene *scene);
+/* UNSUPPORTED: a model of the scene does not have the number; colours are its own now. */
+int subject_check_color(struct subject *subject, const struct link_scene *scene, struct psr_error *err);
 
 /* ---- subject.c, again ---- */
 

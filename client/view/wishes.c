@@ -43,6 +43,7 @@ int wishes_parse(struct wishes *wishes, const struct psr_cli *cli, int argc, cha
                  struct psr_error *err)
 {
 	struct psr_msg_frame frame = { .slot = 0 };
+	uint8_t color_by = PSR_WIRE_COLOR_OWN;
 	int n_files = 0, has_models, code = psr_command_parse("view", cli, argc, argv, &n_files, err);
 
 	if (code != PSR_OK)
@@ -56,10 +57,15 @@ int wishes_parse(struct wishes *wishes, const struct psr_cli *cli, int argc, cha
 	if (has_models || (needs_model && n_files == 0))
 		code = scene_check(&wishes->scene, err);
 	if (code == PSR_OK)
+		code = scene_color_parse(&color_by, wishes->scene.color_by, err);
+	if (code == PSR_OK)
 		code = view_check(&wishes->camera, err);
 	if (code == PSR_OK)
 		code = quality_apply(&frame, &wishes->quality, err);
 	if (code == PSR_OK)
 		code = psr_address_check(wishes->server, err);
-	return code == PSR_OK ? subject_init(&wishes->subject, &wishes->scene, &frame, err) : code;
+	if (code == PSR_OK)
+		code = subject_init(&wishes->subject, &wishes->scene, &frame, err);
+	wishes->subject.color_by = color_by;
+	return code;
 }

@@ -16,6 +16,20 @@ static void *copy(const void *from, size_t n, size_t bytes)
 	return to;
 }
 
+static uint32_t colors_of(const struct psr_model *model)
+{
+	const struct psr_cubes *cubes = psr_model_blocks(model) == NULL ? psr_model_cubes(model) : NULL;
+	uint32_t colors = 1u << PSR_WIRE_COLOR_HEIGHT;
+
+	if (cubes != NULL && cubes->scan.has_intensity)
+		colors |= 1u << PSR_WIRE_COLOR_INTENSITY;
+	if (cubes != NULL && cubes->scan.has_class)
+		colors |= 1u << PSR_WIRE_COLOR_CLASS;
+	if (cubes != NULL && cubes->scan.has_return)
+		colors |= 1u << PSR_WIRE_COLOR_RETURN;
+	return colors;
+}
+
 int card_init(struct card *card, const struct psr_model *model)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(model), *drawn = blocks;
@@ -40,6 +54,7 @@ int card_init(struct card *card, const struct psr_model *model)
 		card->representations |= 1u << PSR_WIRE_REP_DPOINT;
 		card->n_points = points->groups.n_blocks;
 	}
+	card->colors = colors_of(model);
 	psr_model_is_prefix(model, &card->prefix);
 	psr_model_content_id(model, card->content_id);
 	card->presets.camera = copy(presets->camera, presets->n_cameras, sizeof *presets->camera);

@@ -11,6 +11,7 @@ struct card {
 	struct psr_model_info info;
 	struct psr_presets presets; /* freed by the card */
 	uint32_t representations; /* bit r: enum psr_wire_rep r */
+	uint32_t colors;          /* bit c: enum psr_wire_color c, where nobody names a representation */
 	uint32_t n_levels;        /* these of what is drawn where nobody names a representation */
 	uint32_t n_blocks, n_cubes, n_points; /* of blocks, of the octree, groups of differential points; 0 without */
 	uint64_t n_samples;

@@ -12,7 +12,8 @@ int answer_opened(struct session *session, uint32_t id, struct catalogue_model *
 	const struct card *card = &model->card;
 	const struct psr_model_info *info = &card->info;
 	struct psr_msg_opened msg = {
-		.handle = handles_next(&session->handles), .representations = (uint16_t)card->representations,
+		.handle = handles_next(&session->handles), .representations = (uint8_t)card->representations,
+		.colors = (uint8_t)card->colors,
 		.octree_levels = (uint8_t)card->prefix.levels, .of_levels = (uint8_t)card->prefix.of_levels,
 		.scale = info->scale, .spacing = info->spacing, .resolution = info->resolution, .n_levels = card->n_levels,
 		.n_samples = card->n_samples, .n_blocks = card_groups(card, PSR_AUTOMATIC), .bytes = model->bytes,

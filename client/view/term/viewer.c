@@ -30,6 +30,7 @@ static int take_scene(struct viewer *viewer, struct psr_error *err)
 {
 	struct link_scene *scene = link_scene_take(viewer->link);
 	const struct view_wish *wish = &viewer->options->camera;
+	struct psr_error why;
 	int code = PSR_OK;
 
 	if (scene == NULL)
@@ -48,7 +49,11 @@ static int take_scene(struct viewer *viewer, struct psr_error *err)
 	hand_home(&viewer->hand);
 	viewer->has_hand = 1;
 	code = place_camera(viewer, err);
-	return code == PSR_OK ? subject_resolve(&viewer->subject, scene, err) : code;
+	if (code == PSR_OK)
+		code = subject_resolve(&viewer->subject, scene, err);
+	if (code == PSR_OK && subject_check_color(&viewer->subject, scene, &why) != PSR_OK)
+		snprintf(viewer->note, sizeof viewer->note, "%.250s", why.text);
+	return code;
 }
 
 static void say_wish(struct viewer *viewer)
@@ -151,6 +156,7 @@ static int draw(struct viewer *viewer, struct psr_error *err)
 	if (why.code != PSR_OK)
 		return psr_fail(err, why.code, "%s", why.text);
 	if (frame != NULL) {
+		view_show_legend(viewer->show, viewer->scene);
 		canvas_draw(&viewer->canvas, frame);
 		viewer->status[0] = '\0'; /* a terminal may have scrolled */
 	}

@@ -202,6 +202,15 @@ static void next_stage(struct viewer *viewer)
 	viewer_note(viewer, "%s", viewer->subject.stage != NULL ? viewer->subject.stage_name : "colours");
 }
 
+static void next_color(struct viewer *viewer)
+{
+	subject_next_color(&viewer->subject, viewer->scene);
+	if (viewer->subject.color_by != PSR_WIRE_COLOR_OWN)
+		viewer_note(viewer, "coloured by %s", scene_colors[viewer->subject.color_by]);
+	else
+		viewer_note(viewer, "the model's own colours");
+}
+
 static void next_background(struct viewer *viewer)
 {
 	static const uint8_t colors[][3] = { { 0x20, 0x24, 0x28 }, { 255, 255, 255 }, { 128, 128, 128 }, { 0, 0, 0 } };
@@ -277,6 +286,7 @@ static int key_of_light(struct viewer *viewer, SDL_Keycode key)
 	case SDLK_PAGEDOWN: set_ambient(viewer, -0.05); break;
 	case SDLK_b: next_background(viewer); break;
 	case SDLK_t: next_stage(viewer); break;
+	case SDLK_v: next_color(viewer); break;
 	case SDLK_k:
 		viewer->subject.has_key_light = 1;
 		viewer->subject.n_lights = 0;

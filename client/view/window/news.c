@@ -87,6 +87,8 @@ static void take_scene(struct viewer *viewer)
 	}
 	if (subject_resolve(&viewer->subject, scene, &err) != PSR_OK)
 		viewer_note(viewer, "%s", err.text);
+	if (subject_check_color(&viewer->subject, scene, &err) != PSR_OK)
+		viewer_note(viewer, "%s", err.text);
 }
 
 uint32_t news_greater_side(const struct viewer *viewer)

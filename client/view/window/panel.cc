@@ -178,6 +178,7 @@ static void draw_help(struct viewer *viewer)
 		{ "click, G drag", "choose a model, move it; Shift turns, Ctrl scales" },
 		{ "x   n", "shadows; smoothing" },
 		{ ", .   PgUp PgDn   b", "spacing; ambient; background" },
+		{ "v", "colours by intensity, class, height, return, as far as the model has them" },
 		{ "t   m", "pictures of stages; measure" },
 		{ "F2   F5   Space", "screenshot; record a way; play it" },
 		{ "Tab   p   F11   Esc", "overlay; panel; full screen; end" },

@@ -185,6 +185,22 @@ static void draw_lights(struct viewer *viewer)
 			subject->background[i] = (uint8_t)(background[i] * 255 + 0.5f);
 }
 
+static void draw_colors(struct viewer *viewer)
+{
+	struct subject *subject = &viewer->subject;
+	const char *const now = subject->color_by != PSR_WIRE_COLOR_OWN ? scene_colors[subject->color_by] : "none";
+
+	if (!ImGui::BeginCombo("colour by", now))
+		return;
+	if (ImGui::Selectable("none", subject->color_by == PSR_WIRE_COLOR_OWN))
+		subject->color_by = PSR_WIRE_COLOR_OWN;
+	for (uint8_t by = PSR_WIRE_COLOR_OWN + 1; by <= PSR_WIRE_COLOR_RETURN; by++)
+		if (viewer->scene != nullptr && subject_has_color(viewer->scene, by)
+		    && ImGui::Selectable(scene_colors[by], subject->color_by == by))
+			subject->color_by = by;
+	ImGui::EndCombo();
+}
+
 static void draw_quality(struct viewer *viewer)
 {
 	struct subject *subject = &viewer->subject;
@@ -198,6 +214,7 @@ static void draw_quality(struct viewer *viewer)
 		subject->is_smooth = is_smooth;
 	if (ImGui::SliderInt("passes", &passes, 0, PSR_MAX_PASS))
 		subject->passes = (uint16_t)passes;
+	draw_colors(viewer);
 	if (ImGui::BeginCombo("show", subject->stage != nullptr ? subject->stage_name : "colours")) {
 		if (ImGui::Selectable("colours", subject->stage == nullptr))
 			viewer_set_stage(viewer, nullptr);

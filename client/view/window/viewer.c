@@ -84,6 +84,8 @@ static void draw(struct viewer *viewer)
 	if (viewer->has_hand)
 		viewer->pixels = view_show_draw(viewer->show, &viewer->hand.camera, viewer->hand.width, viewer->hand.height,
 		                                &viewer->shown, &err);
+	if (viewer->pixels != NULL)
+		view_show_legend(viewer->show, viewer->scene);
 	if (viewer->pixels != NULL && upload(viewer, viewer->pixels))
 		SDL_RenderCopy(viewer->renderer, viewer->texture, NULL, NULL);
 	else if (err.code != PSR_OK)

@@ -20,7 +20,7 @@ MESSAGES = {
     "LIST_END": (18, "n_entries:I"),
     "OPEN": (19, "resolution:H levels:B 1x name:string"),
     "PROGRESS": (20, "stage:H 6x done:Q total:Q"),
-    "OPENED": (21, "handle:I representations:H octree_levels:B of_levels:B content_id:16s box_min:3d box_max:3d "
+    "OPENED": (21, "handle:I representations:B colors:B octree_levels:B of_levels:B content_id:16s box_min:3d box_max:3d "
                    "origin:3d scale:d spacing:d resolution:I n_levels:I n_samples:Q n_blocks:Q bytes:Q up:3d"),
     "SCENE": (32, "slot:H flags:H n_instances:H n_lights:H ambient:d background:3B 5x"),  # INSTANCEs and LIGHTs follow
     "FRAME": (33, f"slot:H pass_limit:H {FORMAT} budget:B flags:H time_budget_us:Q error_bound:d {SETTINGS} "

@@ -107,8 +107,11 @@ enum psr_wire_color {
 enum psr_wire_rep { PSR_WIRE_REP_AUTO = 0, PSR_WIRE_REP_BLOCKS = 1, PSR_WIRE_REP_OCTREE = 2, PSR_WIRE_REP_DPOINT = 3 };
 struct psr_msg_opened {
 	uint32_t handle;          /* not 0; of this connection */
-	uint16_t representations; /* bit r: the model has representation r of enum psr_wire_rep; not 0, bit 0 is 0;
+	uint8_t representations;  /* bit r: the model has representation r of enum psr_wire_rep; not 0, bit 0 is 0;
 	                           * receivers ignore unknown bits */
+	uint8_t colors;           /* bit c: it can be painted by c of enum psr_wire_color, as it is drawn where nobody
+	                           * names a representation; bit 0 is 0; all 0: the server does not tell; unknown bits as
+	                           * above */
 	uint8_t octree_levels, of_levels; /* of a beginning: levels of its octree, and of the whole file's; else both 0 */
 	uint8_t content_id[16];
 	double box_min[3], box_max[3]; /* around the samples, in object coordinates (those of the source file) */

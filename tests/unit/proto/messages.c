@@ -273,7 +273,8 @@ static void make(unsigned type, union proto_any *m)
 		break;
 	case PSR_MSG_OPENED:
 		m->opened.handle = 1 + below(1000);
-		m->opened.representations = (uint16_t)(2 * (1 + below(7)));
+		m->opened.representations = (uint8_t)(2 * (1 + below(7)));
+		m->opened.colors = (uint8_t)(2 * below(16));
 		m->opened.of_levels = (uint8_t)below(PSR_WIRE_MAX_LEVELS + 1);
 		m->opened.octree_levels = (uint8_t)(m->opened.of_levels > 0 ? 1 + below(m->opened.of_levels) : 0);
 		m->opened.content_id[below(16)] = (uint8_t)below(256);

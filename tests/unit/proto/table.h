@@ -120,8 +120,8 @@ static const struct proto_field fields_open[] = { AT(open, resolution, F_U16), A
 	AT(open, name, F_TEXT), END };
 static const struct proto_field fields_progress[] = { AT(progress, stage, F_U16), AT(progress, done, F_U64),
 	AT(progress, total, F_U64), END };
-static const struct proto_field fields_opened[] = { AT(opened, handle, F_U32), AT(opened, representations, F_U16),
-	AT(opened, octree_levels, F_U8), AT(opened, of_levels, F_U8),
+static const struct proto_field fields_opened[] = { AT(opened, handle, F_U32), AT(opened, representations, F_U8),
+	AT(opened, colors, F_U8), AT(opened, octree_levels, F_U8), AT(opened, of_levels, F_U8),
 	ARRAY(opened, content_id, F_HEX, 16), ARRAY(opened, box_min, F_F64, 3), ARRAY(opened, box_max, F_F64, 3),
 	ARRAY(opened, origin, F_F64, 3), AT(opened, scale, F_F64), AT(opened, spacing, F_F64),
 	AT(opened, resolution, F_U32), AT(opened, n_levels, F_U32), AT(opened, n_samples, F_U64),

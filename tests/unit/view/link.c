@@ -244,6 +244,53 @@ static void a_server_that_says_nothing_is_given_up_and_comes_back(void **state)
 	link_close(link_);
 }
 
+static int is_refused(const char *text)
+{
+	struct link_state now;
+
+	wait_phase(LINK_REFUSED, &now);
+	return strstr(now.error.text, text) != NULL;
+}
+
+static void colours_that_tell_a_number_come_with_the_picture(void **state)
+{
+	struct link_picture *own, *heights;
+	struct link_state now;
+
+	(void)state;
+	open_link(address);
+	wish_default(&wish, &instance, "teapot");
+	wish.is_rest = 1;
+	say_wish(&wish);
+	own = wait_sharp();
+	assert_int_equal(own->color_by, PSR_WIRE_COLOR_OWN);
+	instance.color_by = PSR_WIRE_COLOR_HEIGHT;
+	say_wish(&wish);
+	heights = wait_sharp();
+	assert_int_equal(heights->color_by, PSR_WIRE_COLOR_HEIGHT);
+	assert_memory_not_equal(own->frame.rgb, heights->frame.rgb, 3 * 320 * 240);
+	link_release(heights);
+	instance.color_by = PSR_WIRE_COLOR_CLASS;
+	say_wish(&wish);
+	assert_true(is_refused("no classes of a scan"));
+	instance.color_by = PSR_WIRE_COLOR_RETURN + 1;
+	assert_int_equal(link_wish(link_, &wish), 0);
+	instance.color_by = PSR_WIRE_COLOR_OWN;
+	say_wish(&wish);
+	link_release(wait_sharp());
+	instance.representation = PSR_WIRE_REP_OCTREE;
+	say_wish(&wish);
+	assert_true(is_refused("asks for representation 2"));
+	instance.representation = PSR_WIRE_REP_BLOCKS;
+	say_wish(&wish);
+	wait_phase(LINK_LIVE, &now);
+	heights = wait_sharp();
+	assert_memory_equal(own->frame.rgb, heights->frame.rgb, 3 * 320 * 240);
+	link_release(heights);
+	link_release(own);
+	link_close(link_);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -255,6 +302,7 @@ int main(void)
 		cmocka_unit_test(far_and_slow_the_last_wish_is_shown_sharp),
 		cmocka_unit_test(a_link_to_nobody_closes_at_once),
 		cmocka_unit_test(wishes_out_of_range_change_nothing),
+		cmocka_unit_test(colours_that_tell_a_number_come_with_the_picture),
 		cmocka_unit_test(a_server_that_says_nothing_is_given_up_and_comes_back),
 	};
 
