@@ -50,6 +50,11 @@ says "sixels are drawn, as the terminal says that it has them; SIGTERM ends it" 
 check "the terminal is as before, too" grep -q '^restored' "$work/said"
 psr shot --quality good --server "$server" --model teapot --view left --size 320x192 -o "$work/shot.ppm" 2>/dev/null
 check "they are near to psr shot's" is_near "$work/sixel.ppm" "$work/shot.ppm"
+says "colours by class, and by the key height" "^exit 0" terminal 60x21 480x336 "wait:sharp picture:$work/class.ppm
+	keys:v wait:coloured_by_height picture:$work/height.ppm keys:q" psr view --term --server "$server" --model scan \
+	--color-by class --pixels kitty
+psr shot --quality good --server "$server" --model scan --color-by class --size 480x320 -o "$work/shot.ppm" 2>/dev/null
+check "with the legend of psr shot" cmp "$work/class.ppm" "$work/shot.ppm"
 is_far() { ! is_near "$@"; }
 psr shot --quality good --server "$server" --model teapot --view right --size 320x192 -o "$work/other.ppm" 2>/dev/null
 check "and not to another side's" is_far "$work/sixel.ppm" "$work/other.ppm"

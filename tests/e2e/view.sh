@@ -165,6 +165,49 @@ check "says so, too" awk -v s="$(models | sed -n 's/.*scale=//p')" 'BEGIN { exit
 xdotool key Escape
 ends "and ends"
 
+# --- colours that tell a number ---
+: >"$work/view.log"
+rm "$work"/shots/*
+n_shots=0
+view --server "$address" --model scan --color-by class --size 320x240 --no-inertia
+colored() { # claim number: the screen, its screenshot and psr shot have these colours, and a legend
+	is_true "$1"
+	is "of $1 the command says so" "$2" "$(said color-by)"
+}
+colored "a scan by class" class
+sh -c "${command% -o *} --no-legend -o '$work/plain.ppm'" 2>/dev/null
+check "has a legend in the window, too" python3 - "$work/screen.ppm" "$work/plain.ppm" <<'END'
+import sys
+a, b = (open(path, "rb").read()[-3 * 320 * 240:] for path in sys.argv[1:])
+changed = [i // 3 for i in range(0, len(a), 3) if a[i:i + 3] != b[i:i + 3]]
+assert len(changed) > 1000 and all(i % 320 < 160 and i // 320 > 100 for i in changed), len(changed)
+END
+for by in height return; do
+	xdotool key v
+	colored "its next number, $by" $by
+done
+xdotool key v
+is_true "and after the last one its own colours"
+check "of which the command says nothing" sh -c '! grep -q color-by <<END
+'"$command"'
+END'
+xdotool key v
+colored "and the first one again, intensity" intensity
+xdotool key Escape
+ends "and ends, too"
+: >"$work/view.log"
+rm "$work"/shots/*
+n_shots=0
+view --server "$address" --model teapot --color-by class --size 320x240 --no-inertia
+shot
+check "a model without classes is shown in its own colours" sh -c '! grep -q color-by <<END
+'"$command"'
+END'
+xdotool key v
+colored "by height, which any model has" height
+xdotool key Escape
+ends "the end of the colours"
+
 # --- a way of the camera ---
 view --server "$address" --model wheel --size 320x240 --no-inertia --record "$work/way.json"
 n_shots=0

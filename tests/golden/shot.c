@@ -21,6 +21,7 @@ struct words {
 	uint32_t size[2];
 	int is_smooth, is_plain;
 	const char *quality; /* NULL, or fine */
+	const char *color_by; /* NULL, or as psr shot has it */
 	int64_t n_passes;
 	struct psr_camera_wish wish;
 	double fov, ortho, ambient;
@@ -59,11 +60,19 @@ static int place_instance(struct shot *shot, const struct psr_model *(*open)(con
 static int place_instances(struct shot *shot, const struct reader *reader, struct psr_error *err)
 {
 	const struct words *words = &reader->now;
+	static const char *const colors[] = { "", "intensity", "class", "height", "return" }; /* by enum psr_color_by */
+	unsigned color_by = PSR_COLOR_OWN;
 	int rc = place_instance(shot, reader->open, words->model ? words->model : "", NULL, err);
 
 	shot->scene.instance = shot->instance;
 	for (uint32_t i = 0; !rc && i < words->n_instances; i++)
 		rc = place_instance(shot, reader->open, words->instance[i].model, &words->instance[i].place, err);
+	while (words->color_by && color_by <= PSR_COLOR_RETURN && strcmp(colors[color_by], words->color_by) != 0)
+		color_by++;
+	if (!rc && color_by > PSR_COLOR_RETURN)
+		return psr_fail(err, PSR_ERR_ARG, "'%.40s' is no number of a point", words->color_by);
+	for (uint32_t i = 0; !rc && i < shot->scene.n_instances; i++)
+		shot->instance[i].color_by = (enum psr_color_by)color_by;
 	return rc;
 }
 
@@ -199,6 +208,7 @@ int shots_read(const char *path, const struct psr_model *(*open)(const char *nam
 		{ .name = "ambient", .type = PSR_OPT_REAL, .value = &now->ambient, .seen = &now->has_ambient },
 		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &now->is_smooth },
 		{ .name = "no-smooth", .type = PSR_OPT_FLAG, .value = &now->is_plain },
+		{ .name = "color-by", .type = PSR_OPT_STRING, .value = &now->color_by },
 		{ .name = "quality", .type = PSR_OPT_STRING, .value = &now->quality },
 		{ .name = "passes", .type = PSR_OPT_INT, .value = &now->n_passes },
 		{ .name = "background", .type = PSR_OPT_COLOR, .value = now->background },
