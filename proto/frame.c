@@ -67,7 +67,8 @@ static void layout_settings(struct wire *w, struct psr_msg_settings *m)
 	wire_u8(w, &m->scale);
 	wire_u8(w, &m->smooth);
 	wire_u8(w, &m->pass);
-	wire_reserved(w, 5);
+	wire_u8(w, &m->splats);
+	wire_reserved(w, 4);
 	wire_f64(w, &m->spacing_px, 1);
 }
 
@@ -76,7 +77,8 @@ static int check_settings(const struct psr_msg_settings *m, struct psr_error *er
 	if (m->scale != 1 && m->scale != 2 && m->scale != 4)
 		return psr_fail(err, PSR_ERR_ARG, "the scale of the settings is %u: it must be 1, 2 or 4", m->scale);
 	if (check_integer("the smoothing of the settings", m->smooth, 0, 2, err) ||
-	    check_integer("the pass of the settings", m->pass, 0, PSR_WIRE_MAX_PASS, err))
+	    check_integer("the pass of the settings", m->pass, 0, PSR_WIRE_MAX_PASS, err) ||
+	    check_integer("the splats of the settings", m->splats, 0, 1, err))
 		return PSR_ERR_ARG;
 	return check_range("the sample spacing of the settings (pixels)", m->spacing_px, 1.0 / 64, 64, err);
 }
@@ -92,6 +94,7 @@ void psr_settings_unpack(struct psr_msg_settings *settings, uint64_t packed)
 	settings->scale = (uint8_t)packed;
 	settings->smooth = (uint8_t)(packed >> 8);
 	settings->pass = (uint8_t)(packed >> 16);
+	settings->splats = 0; /* budgets choose none */
 	settings->spacing_px = (double)(packed >> 32) / SPACING_ONE;
 }
 
@@ -188,7 +191,8 @@ static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
 {
 	const struct psr_msg_settings *settings = &m->settings;
 	const int has_bound = m->budget == PSR_WIRE_BUDGET_ERROR || m->budget == PSR_WIRE_BUDGET_RMSE;
-	const int no_settings = !settings->scale && !settings->smooth && !settings->pass && settings->spacing_px == 0;
+	const int no_settings = !settings->scale && !settings->smooth && !settings->pass && !settings->splats
+	                        && settings->spacing_px == 0;
 
 	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_RMSE, err) ||
 	    (m->budget != PSR_WIRE_BUDGET_TIME && check_zero("a time budget", m->time_budget_us == 0, err)) ||

@@ -28,6 +28,7 @@ void mix_add_options(struct optlist *list, struct mix_line *line)
 	OPTLIST_ADD(list, opts);
 	scene_add_light_options(list, &line->scene);
 	quality_add_options(list, &line->quality);
+	quality_add_splats_option(list, &line->quality);
 	quality_add_budget_option(list, &line->quality);
 	quality_add_codec_option(list, &line->quality);
 }

@@ -148,6 +148,7 @@ static int draw(uint64_t *hash, struct artist *artist, const struct bench_kept *
 	psr_settings_default(&settings, kind->frame.width / drawn->scale, kind->frame.height / drawn->scale);
 	settings.spacing_px = drawn->spacing_px;
 	settings.smooth = drawn->smooth;
+	settings.with_splats = drawn->splats;
 	settings.pass = drawn->pass > 0 ? drawn->pass : kept->pass;
 	code = psr_frame_alloc(&frame, kind->frame.width, kind->frame.height, 1 << PSR_PLANE_COLOR, err);
 	if (code != PSR_OK)

@@ -24,6 +24,7 @@ void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct
 	scene_add_light_options(list, &wish->scene);
 	optlist_heading(list, "Quality", NULL);
 	quality_add_options(list, &wish->quality);
+	quality_add_splats_option(list, &wish->quality);
 	quality_add_budget_option(list, &wish->quality);
 	quality_add_codec_option(list, &wish->quality);
 	optlist_heading(list, "For developers", NULL);

@@ -37,7 +37,8 @@ static int send_frame(struct psr_client *client, const struct psr_shot *shot, co
 	struct psr_msg_frame msg = {
 		.pass_limit = (uint16_t)settings->pass, .width = settings->width, .height = settings->height,
 		.planes = shot->planes, .budget = PSR_WIRE_BUDGET_SETTINGS, .camera = *camera,
-		.settings = { .scale = 1, .smooth = (uint8_t)settings->smooth, .spacing_px = settings->spacing_px },
+		.settings = { .scale = 1, .smooth = (uint8_t)settings->smooth, .splats = settings->with_splats != 0,
+		              .spacing_px = settings->spacing_px },
 	};
 
 	if (settings->pass > PSR_MAX_PASS)

@@ -93,6 +93,7 @@ static int check_offered(const struct psr_client *client, uint16_t view, const s
 		{ asked->budget == PSR_WIRE_BUDGET_RMSE, PSR_CAP_RMSE_BOUND, "keep bounds on the RMSE" },
 		{ asked->settings.pass > 0, PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND, "draw a pass at once" },
 		{ asked->settings.smooth > 1, PSR_CAP_FINE, "draw fine pictures" },
+		{ asked->settings.splats != 0, PSR_CAP_SPLATS, "draw octrees as splats" },
 		{ asked->depth_format > PSR_WIRE_DEPTH_F32, PSR_CAP_DEPTH_U16, "send depth as u16" },
 		{ asked->flags & PSR_WIRE_FRAME_SHARP, PSR_CAP_SHARP, "send sharp frames" },
 	};

@@ -133,6 +133,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
 	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.smooth);
 	cJSON_AddBoolToObject(report, "fine", event->begin->settings.smooth == PSR_SMOOTH_FINE);
+	cJSON_AddBoolToObject(report, "splats", event->begin->settings.splats);
 	cJSON_AddNumberToObject(report, "pass", event->begin->pass);
 	cJSON_AddStringToObject(report, "status", status[event->end->status < 3 ? event->end->status : 0]);
 	cJSON_AddNumberToObject(report, "error_px", event->end->error_px);

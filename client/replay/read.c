@@ -218,7 +218,7 @@ static void read_planes(struct reader *reader, struct psr_msg_frame *frame, cons
 				frame->planes |= 1u << plane;
 }
 
-/* A report of psr 0.2 and before has neither scale, pass nor fine. */
+/* A report of psr 0.2 and before has neither scale, pass, fine nor splats. */
 static void read_detail(struct reader *reader, struct psr_msg_frame *frame, const cJSON *request)
 {
 	struct psr_msg_settings *settings = &frame->settings;
@@ -238,6 +238,8 @@ static void read_detail(struct reader *reader, struct psr_msg_frame *frame, cons
 	settings->smooth = (uint8_t)get_flag(reader, request, "smooth");
 	if (cJSON_HasObjectItem(request, "fine") && get_flag(reader, request, "fine"))
 		settings->smooth = PSR_SMOOTH_FINE;
+	if (cJSON_HasObjectItem(request, "splats"))
+		settings->splats = (uint8_t)get_flag(reader, request, "splats");
 	frame->pass_limit = (uint16_t)get_number(reader, request, "passes", 0, 16);
 }
 

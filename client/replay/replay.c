@@ -87,6 +87,7 @@ static void add_detail(cJSON *to, const struct psr_msg_frame *frame)
 	json_add_number(to, "spacing_px", frame->settings.spacing_px);
 	cJSON_AddBoolToObject(to, "smooth", frame->settings.smooth);
 	cJSON_AddBoolToObject(to, "fine", frame->settings.smooth == PSR_SMOOTH_FINE);
+	cJSON_AddBoolToObject(to, "splats", frame->settings.splats);
 	cJSON_AddNumberToObject(to, "pass", frame->settings.pass);
 	cJSON_AddNumberToObject(to, "passes", frame->pass_limit);
 }

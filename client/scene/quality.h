@@ -13,12 +13,14 @@ struct quality_wish {
 	int is_smooth, is_plain, has_name, has_spacing, has_passes;
 	const char *budget; /* instead of name, spacing, smoothing and passes; NULL: none */
 	const char *codec;
+	int with_splats;
 	int n_said; /* how many of the other options were given */
 };
 
 /* name: the quality of who names none. */
 void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *name, const char *codec);
 void quality_add_options(struct optlist *list, struct quality_wish *wish);
+void quality_add_splats_option(struct optlist *list, struct quality_wish *wish);
 void quality_add_codec_option(struct optlist *list, struct quality_wish *wish); /* of still pictures */
 void quality_add_budget_option(struct optlist *list, struct quality_wish *wish); /* where each picture stands alone */
 int quality_is_said(const struct quality_wish *wish); /* any of these options was given */

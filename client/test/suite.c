@@ -189,6 +189,7 @@ static void add_options(struct optlist *list, struct reader *reader)
 	view_add_options(list, &reader->now.view);
 	scene_add_light_options(list, &reader->now.scene);
 	quality_add_options(list, &reader->now.quality);
+	quality_add_splats_option(list, &reader->now.quality);
 	quality_add_budget_option(list, &reader->now.quality);
 	quality_add_codec_option(list, &reader->now.quality);
 	expect_add_options(list, &reader->expect);

@@ -32,7 +32,7 @@ static const struct {
 	                         "" } },
 	[PSR_EFFECT_SPLATS] = { "splats",
 	                        { "", "the settings turn it off", "no octree is in view; other instances are drawn as without",
-	                          "", "" } },
+	                          "passes draw leaves as discs", "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)

@@ -3,7 +3,7 @@
 #include "sheer.h"
 #include "stages.h"
 
-/* Measured: 20 to 35 bytes a pixel, 0.1 to 0.4 MB a shadow map with the generated models. */
+/* Measured without splats: 20 to 35 bytes a pixel, 0.1 to 0.4 MB a shadow map with the generated models. */
 #define LEAST_BYTES (UINT64_C(1) << 20)
 #define PIXEL_BYTES 40
 #define BLOCK_BYTES (sizeof(struct cull_hit) + sizeof(struct bin_entry) + sizeof(uint32_t)) /* in one tile */
@@ -18,6 +18,8 @@ uint64_t renderer_need(const struct renderer_need *need)
 	uint64_t bytes = LEAST_BYTES + n_pixels * PIXEL_BYTES + n_maps * SHADOW_MAP_BYTES
 	                 + need->n_blocks * BLOCK_BYTES * 5 / 4; /* as of bins_room() */
 
+	if (need->with_splats)
+		bytes += n_pixels * sizeof(struct ewa_sum);
 	if (need->pass > 0)
 		bytes += refiner_most_bytes(area);
 	if (need->has_sheer)

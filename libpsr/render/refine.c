@@ -229,7 +229,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	struct psr_frame fine;
 
 	window.with_splats = !still->is_fine;
-	window.with_ewa = 0;
+	window.with_ewa = still->is_fine && settings->with_ewa;
 	window.smooth = still->is_fine ? PSR_SMOOTH_EDGES : PSR_SMOOTH_NONE;
 	window.is_wide = is_wide;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };

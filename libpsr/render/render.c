@@ -61,6 +61,10 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
 		settings.cancel = (struct psr_cancel){ is_cancelled, &latch };
 	if (settings.pass == 0 && settings.smooth != PSR_SMOOTH_FINE)
 		return renderer_draw(renderer, scene, &settings, pool, frame, err);
-	const int rc = *refiner != NULL ? PSR_OK : refiner_create(refiner, renderer, err);
-	return rc ? rc : refiner_draw(*refiner, scene, &settings, pool, frame, err);
+	int rc = *refiner != NULL ? PSR_OK : refiner_create(refiner, renderer, err);
+	if (rc == PSR_OK)
+		rc = refiner_draw(*refiner, scene, &settings, pool, frame, err);
+	if (rc == PSR_OK && asked->with_splats && asked->pass > 0)
+		frame->report.effect[PSR_EFFECT_SPLATS].why = PSR_WHY_VOID;
+	return rc;
 }

@@ -296,6 +296,7 @@ static int draw_picture(struct drawing *d, struct draw_worker *worker, struct ps
 	psr_settings_default(&settings, picture->width, picture->height);
 	settings.spacing_px = d->settings.spacing_px;
 	settings.smooth = d->settings.smooth;
+	settings.with_splats = d->settings.splats;
 	settings.pass = d->settings.pass > 0 ? d->settings.pass : d->refine;
 	settings.cancel = (struct psr_cancel){ is_cancelled_or_yields, d };
 	code = psr_render(worker->renderer, &scene, &settings, d->pool, picture, err);
@@ -374,7 +375,7 @@ uint64_t draw_bytes(const struct psr_msg_frame *request, const struct scene *sce
 		.width = request->width, .height = request->height, .n_threads = n_threads,
 		.pass = pass > request->pass_limit ? pass : request->pass_limit,
 		.n_shadow_lights = scene_shadow_lights(scene), .has_sheer = scene_has_sheer(scene),
-		.n_blocks = scene_blocks(scene),
+		.n_blocks = scene_blocks(scene), .with_splats = request->settings.splats && scene_has_octrees(scene),
 	};
 
 	return renderer_need(&need) + planes_bytes(request->planes, (uint64_t)request->width * request->height,

@@ -168,7 +168,7 @@ void frame_learn(struct frame *frame, struct budget_learnt *of_all)
 	struct drawing *d = &frame->drawing;
 
 	d->spent.total_ns = (double)(clock_ns() - d->start_ns);
-	if (d->refine > 0)
+	if (d->refine > 0 || d->settings.splats) /* budgets choose none */
 		return;
 	budget_learn(&frame_flow(frame)->learnt, &d->seen, d->is_seen, &d->settings, &d->spent);
 	budget_learn(of_all, &d->seen, d->is_seen, &d->settings, &d->spent);
@@ -180,7 +180,7 @@ int frame_is_slight(const struct frame *frame)
 	const struct scene *scene = frame->drawing.scene;
 
 	return frame->request.n_frames == 1 && frame->drawing.settings.pass == 0
-	       && frame->drawing.settings.smooth != PSR_SMOOTH_FINE
+	       && frame->drawing.settings.smooth != PSR_SMOOTH_FINE && !frame->drawing.settings.splats
 	       && (uint64_t)request->width * request->height <= SLIGHT_PIXELS
 	       && scene->scene.n_instances <= SLIGHT_INSTANCES && scene_blocks(scene) <= SLIGHT_BLOCKS
 	       && scene_shadow_lights(scene) == 0 && !scene_has_sheer(scene);

@@ -79,6 +79,18 @@ int scene_has_sheer(const struct scene *scene)
 	return 0;
 }
 
+int scene_has_octrees(const struct scene *scene)
+{
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++) {
+		const struct card *card = &scene->model[scene->of_instance[i]]->card;
+		const enum psr_representation as = scene->instance[i].representation;
+
+		if (as == PSR_OCTREE || (as == PSR_AUTOMATIC && card->n_blocks == 0 && card->n_cubes > 0))
+			return 1;
+	}
+	return 0;
+}
+
 int scene_check_calibrated(const struct scene *scene, struct psr_error *err)
 {
 	for (uint32_t i = 0; i < scene->scene.n_instances; i++) {

@@ -32,6 +32,7 @@ double scene_area(const struct scene *scene, const struct psr_camera *camera, ui
 /* UNSUPPORTED: an instance's model has no calibration, or it is drawn as an octree, which has none. */
 int scene_check_calibrated(const struct scene *scene, struct psr_error *err);
 int scene_has_sheer(const struct scene *scene);          /* a model has samples that let light through */
+int scene_has_octrees(const struct scene *scene);        /* an instance is drawn as one */
 
 /* Gives the instances their models, all of which are in memory and pinned: before a frame is drawn. */
 void scene_bind(struct scene *scene);

@@ -21,7 +21,7 @@ static void welcome(struct conn *conn, const struct options *options)
 		                PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS | PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
 		                PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND | PSR_CAP_RMSE_BOUND |
 		                PSR_CAP_BOUND | PSR_CAP_OCTREE | PSR_CAP_DPOINT | PSR_CAP_FETCH | PSR_CAP_LEVELS |
-		                PSR_CAP_COLOR_BY | PSR_CAP_FINE,
+		                PSR_CAP_COLOR_BY | PSR_CAP_FINE | PSR_CAP_SPLATS,
 		.max_message = PSR_WIRE_MAX_MESSAGE,
 		.max_side = PSR_WIRE_MAX_SIDE,
 		.max_pixels = (uint32_t)options->max_pixels,

@@ -201,6 +201,26 @@ for budget in 0.001ms 60000ms 2px; do
 done
 check "so are an octree and blocks in one scene" \
 	shot --model teapot --instance both,as=octree,at=1,0,0 --budget 60000ms -o "$work/budget.ppm"
+# --- splats ---
+check "splats make another picture" \
+	[ -n "$(hashes --model ball --splats)" -a "$(hashes --model ball --splats)" != "$ball" ]
+is "of blocks they make none" "$(hashes --model teapot)" "$(hashes --model teapot --splats)"
+said_of_splats() { shot "$@" --effects -o "$work/splats.ppm" 2>/dev/null | grep '^splats'; }
+check "psr says how many" grep -qE "^splats     ran: [0-9]+ leaves" <(said_of_splats --model ball --splats)
+is "and why there are none of blocks" "splats     left out: no octree is in view; other instances are drawn as without" \
+	"$(said_of_splats --model teapot --splats)"
+is "nor in passes" "splats     left out: passes draw leaves as discs" "$(said_of_splats --model ball --splats --passes 1)"
+is "nor unless they are asked for" "splats     left out: the settings turn it off" "$(said_of_splats --model ball)"
+for quality in good fine; do
+	check "a $quality picture of splats has a report" shot --model ball --splats --quality $quality \
+		--report "$work/splats.json" -o "$work/splats.ppm"
+	is "which tells of them" "True True" "$(value "$work/splats.json" splats) $(value "$work/splats.json" request.splats)"
+	check "and draws them again" psr shot --server "$server" --replay "$work/splats.json" -o "$work/again.ppm"
+	check "with the same bytes" cmp "$work/splats.ppm" "$work/again.ppm"
+done
+refuses "splats and a budget" 2 "excludes .*--splats" shot --model ball --splats --budget 12ms --hash
+check "psr bench draws them, and psr draws them again" psr bench --server "$server" --model ball --splats --frames 4 \
+	--size 64x64 --codec lossless --verify 1 --verify-models "$work/models"
 psr list --server "$server" --json >"$work/list.json" 2>/dev/null
 shot --model both --report "$work/report.json" -o "$work/both.png" 2>/dev/null
 is "a report names what the model has" "blocks octree" "$(python3 -c 'import json, sys

@@ -77,6 +77,7 @@ static void draw(struct golden *out, const struct shot *shot, const struct way *
 	psr_settings_default(&settings, shot->size[0], shot->size[1]);
 	settings.smooth = shot->smooth;
 	settings.pass = shot->n_passes;
+	settings.with_splats = shot->with_splats;
 	if (psr_frame_alloc(&frame, shot->size[0], shot->size[1], shot->planes, &err)
 	    || psr_render(way->renderer, &shot->scene, &settings, way->pool, &frame, &err))
 		stop(shot->name, err.text);

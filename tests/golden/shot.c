@@ -19,7 +19,7 @@ struct words {
 	struct instance_wish instance[SHOT_MAX_INSTANCES]; /* besides the model */
 	uint32_t n_instances;
 	uint32_t size[2];
-	int is_smooth, is_plain;
+	int is_smooth, is_plain, with_splats;
 	const char *quality; /* NULL, or fine */
 	const char *color_by; /* NULL, or as psr shot has it */
 	int64_t n_passes;
@@ -123,6 +123,7 @@ static int end_shot(struct reader *reader, struct psr_error *err)
 	memcpy(shot.size, now->size, sizeof shot.size);
 	shot.smooth = now->quality != NULL ? PSR_SMOOTH_FINE : now->is_plain ? PSR_SMOOTH_NONE : PSR_SMOOTH_EDGES;
 	shot.n_passes = (unsigned)now->n_passes;
+	shot.with_splats = now->with_splats;
 	int rc = place_instances(&shot, reader, err);
 	for (unsigned plane = 0; !rc && plane < PSR_N_PLANES; plane++)
 		if (now->hash[plane]) {
@@ -211,6 +212,7 @@ int shots_read(const char *path, const struct psr_model *(*open)(const char *nam
 		{ .name = "color-by", .type = PSR_OPT_STRING, .value = &now->color_by },
 		{ .name = "quality", .type = PSR_OPT_STRING, .value = &now->quality },
 		{ .name = "passes", .type = PSR_OPT_INT, .value = &now->n_passes },
+		{ .name = "splats", .type = PSR_OPT_FLAG, .value = &now->with_splats },
 		{ .name = "background", .type = PSR_OPT_COLOR, .value = now->background },
 		{ .name = NULL },
 	};

@@ -13,6 +13,7 @@ struct shot {
 	uint32_t size[2];
 	enum psr_smooth smooth;
 	unsigned n_passes;
+	int with_splats;
 	struct psr_scene scene; /* of instances and lights below: the shot must stay where it is */
 	struct psr_instance instance[SHOT_MAX_INSTANCES];
 	struct psr_light light[SHOT_MAX_LIGHTS];

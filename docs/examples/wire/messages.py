@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 # A payload is a line of NAME:LETTERS, with the letters of the module struct, or "string"; "7x" are reserved bytes.
 CAMERA = "camera_kind:B 7x camera_eye:3d camera_target:3d camera_up:3d camera_extent:d camera_near_z:d"
-SETTINGS = "settings_scale:B settings_smooth:B settings_pass:B 5x settings_spacing_px:d"
+SETTINGS = "settings_scale:B settings_smooth:B settings_pass:B settings_splats:B 4x settings_spacing_px:d"
 FORMAT = "width:I height:I planes:I color_codec:B color_quality:B depth_format:B depth_codec:B data_codec:B"
 MESSAGES = {
     "HELLO": (1, "magic:8s routing_key:Q major:H minor:H 4x capabilities:Q 16x token:string client:string"),

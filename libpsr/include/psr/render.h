@@ -34,7 +34,8 @@ struct psr_settings {
 	 * it. 0..PSR_MAX_PASS; 0 by default. */
 	unsigned pass;
 	/* 1: octrees are drawn as anti-aliased splats ([B] 5.2) in place of points and the gaps between them: leaves of one
-	 * surface are mixed. Other instances are drawn as without it. 0 by default; passes above 0 ignore it. */
+	 * surface are mixed. Other instances are drawn as without it. A frame takes 32 bytes more a pixel that it draws at
+	 * once. 0 by default; passes above 0 ignore it, and report why (PSR_EFFECT_SPLATS): their leaves are discs. */
 	int with_splats;
 	struct psr_cancel cancel; /* ends the frame within some milliseconds; nobody by default */
 };

@@ -21,11 +21,19 @@ void octree_truth_fini(struct octree_truth *truth);
 
 struct octree_drawn {
 	double fps, db, wrong; /* frames a second; decibels over covered pixels; holes and leaks, of a million inside */
+	double inside_db;      /* of octree_score() */
 };
 
 /* Draws all views of two models in turn. Needs study->renderer. */
 int octree_compare(struct octree_drawn drawn[2], struct study *study, const struct study_model *of,
                    const struct psr_model *const model[2], const struct octree_truth *truth);
+
+/* Draws all views of a model with these settings, of OCTREE_SIDE pixels. Needs study->renderer. */
+int octree_score(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
+                 const struct psr_model *model, const struct psr_settings *settings, const struct octree_truth *truth);
+
+/* How many pixels of a view are a unit of the mesh, in the middle of the model. */
+double octree_pixels(const struct study_model *of);
 
 /* Makes the octree of a mesh, and the model of it. The caller owns *tree, which is NULL or whole, and *out. */
 int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,

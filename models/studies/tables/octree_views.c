@@ -134,9 +134,49 @@ int octree_compare(struct octree_drawn drawn[2], struct study *study, const stru
 			return rc;
 	}
 	for (int m = 0; m < 2; m++)
-		drawn[m] = (struct octree_drawn){ OCTREE_VIEWS / seconds[m], -10 * log10(sums.square[m] / (double)sums.n),
-			                              1e6 * (double)sums.n_wrong[m] / (double)sums.n_inside };
+		drawn[m] = (struct octree_drawn){ .fps = OCTREE_VIEWS / seconds[m],
+			                              .db = -10 * log10(sums.square[m] / (double)sums.n),
+			                              .wrong = 1e6 * (double)sums.n_wrong[m] / (double)sums.n_inside };
 	return PSR_OK;
+}
+
+int octree_score(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
+                 const struct psr_model *model, const struct psr_settings *settings, const struct octree_truth *truth)
+{
+	double square = 0, square_inside = 0, n = 0, n_inside = 0, n_wrong = 0;
+	uint64_t ns = 0;
+
+	for (int v = 0; v < OCTREE_VIEWS; v++) {
+		struct psr_frame frame = truth->frame;
+		struct psr_errors errors;
+		struct stage stage;
+		int rc;
+
+		set_stage(&stage, of, directions[v]);
+		stage.instance.model = model;
+		rc = psr_render(study->renderer, &stage.scene, settings, study->pool, &frame, study->err);
+		if (rc == PSR_OK) /* the first one warms */
+			rc = psr_render(study->renderer, &stage.scene, settings, study->pool, &frame, study->err);
+		if (rc == PSR_OK)
+			rc = psr_errors_measure(&errors, &frame, &truth->view[v], psr_model_info(model)->spacing, study->err);
+		if (rc != PSR_OK)
+			return rc;
+		for (int s = 0; s < PSR_N_STAGES; s++)
+			ns += frame.report.ns[s];
+		square += pow(10, -errors.psnr / 10) * (double)errors.n_covered;
+		square_inside += pow(10, -errors.psnr_inside / 10) * (double)errors.n_inside;
+		n += (double)errors.n_covered;
+		n_inside += (double)errors.n_inside;
+		n_wrong += (double)(errors.n_holes + errors.n_leaks);
+	}
+	*drawn = (struct octree_drawn){ .fps = OCTREE_VIEWS / ((double)ns * 1e-9), .db = -10 * log10(square / n),
+		                            .wrong = 1e6 * n_wrong / n_inside, .inside_db = -10 * log10(square_inside / n_inside) };
+	return PSR_OK;
+}
+
+double octree_pixels(const struct study_model *of)
+{
+	return OCTREE_SIDE / (2 * DISTANCE * of->scale * tan(asin(MARGIN / DISTANCE)));
 }
 
 void octree_truth_fini(struct octree_truth *truth)

@@ -67,5 +67,6 @@ int table_subdivision(struct study *study);
 int table_culling(struct study *study);
 int table_octree(struct study *study);
 int table_octree_prefixes(struct study *study);
+int table_octree_splats(struct study *study);
 
 #endif

@@ -56,6 +56,7 @@ enum psr_cap {
 	PSR_CAP_LEVELS = 1 << 25,      /* OPEN of the first levels of a packed octree */
 	PSR_CAP_COLOR_BY = 1 << 26,    /* instances in other colours than their own */
 	PSR_CAP_FINE = 1 << 28,        /* settings of smooth 2 */
+	PSR_CAP_SPLATS = 1 << 29,      /* settings of splats 1 */
 };
 
 /* ---- the session ---- */
@@ -207,6 +208,7 @@ struct psr_msg_settings { /* resolved settings: with them a frame is a pure func
 	                      * (PSR_CAP_FINE), fine: draws so at twice the size, and takes means; else 0 */
 	uint8_t pass;        /* level of refinement that frame 0 has at once, 0..4; above 0 for servers that offer a budget
 	                      * of time or error */
+	uint8_t splats;      /* 1 (PSR_CAP_SPLATS): leaves of octrees are splats, in frames of level 0; else 0 */
 	double spacing_px;   /* greatest distance of neighbouring samples, pixels; 1 is [G]'s adequate sampling;
 	                      * 2^-6..2^6 */
 };

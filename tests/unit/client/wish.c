@@ -290,6 +290,10 @@ static void what_is_said_wins_over_the_quality(void **state)
 	wish.passes = 1;
 	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
 	assert_int_equal(frame.pass_limit, 1);
+	assert_int_equal(frame.settings.splats, 0);
+	wish.with_splats = 1;
+	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
+	assert_int_equal(frame.settings.splats, 1);
 	wish.is_plain = 1;
 	assert_int_equal(quality_apply(&frame, &wish, &err), PSR_ERR_ARG);
 	wish.name = "worst";

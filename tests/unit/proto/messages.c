@@ -155,6 +155,7 @@ static void make_frame(struct psr_msg_frame *m)
 		m->settings.scale = (uint8_t)(1u << below(3));
 		m->settings.smooth = (uint8_t)below(3);
 		m->settings.pass = (uint8_t)below(PSR_WIRE_MAX_PASS + 1);
+		m->settings.splats = (uint8_t)below(2);
 		m->settings.spacing_px = 1.0 / 64 + 63 * unit();
 	}
 	if (m->budget == PSR_WIRE_BUDGET_SETTINGS) {
@@ -190,6 +191,7 @@ static void make_begin(struct psr_msg_frame_begin *m)
 	m->settings.scale = 4;
 	m->settings.smooth = 1;
 	m->settings.pass = 4;
+	m->settings.splats = 1;
 	m->settings.spacing_px = 64;
 	m->camera = f.camera;
 	m->depth_min = f.depth_min;

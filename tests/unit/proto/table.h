@@ -145,7 +145,8 @@ static const struct proto_field fields_scene[] = { AT(scene, slot, F_U16), AT(sc
 #define PICTURE(type) AT(type, width, F_U32), AT(type, height, F_U32), AT(type, planes, F_U32), \
 	AT(type, color_codec, F_U8), AT(type, color_quality, F_U8), AT(type, depth_format, F_U8), \
 	AT(type, depth_codec, F_U8), AT(type, data_codec, F_U8), AT(type, settings.scale, F_U8), \
-	AT(type, settings.smooth, F_U8), AT(type, settings.pass, F_U8), AT(type, settings.spacing_px, F_F64), AT(type, base, F_U32)
+	AT(type, settings.smooth, F_U8), AT(type, settings.pass, F_U8), AT(type, settings.splats, F_U8), \
+	AT(type, settings.spacing_px, F_F64), AT(type, base, F_U32)
 #define LIGHT(type) AT(type, light.kind, F_U8), AT(type, light.flags, F_U8), ARRAY(type, light.color, F_U8, 3), \
 	AT(type, light.intensity, F_F64), ARRAY(type, light.position, F_F64, 3), ARRAY(type, light.direction, F_F64, 3), \
 	AT(type, light.inner, F_F64), AT(type, light.outer, F_F64), AT(type, light.reference, F_F64)

@@ -13,39 +13,49 @@
 
 #define PLANES (1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH)
 
-static struct psr_model *teapot;
+static struct psr_model *teapot, *knot; /* blocks; an octree */
 static struct psr_instance instance;
 static struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
 
 static int open_model(void **state)
 {
 	(void)state;
-	return psr_model_read(&teapot, "tests/golden/teapot.psr", NULL);
+	return psr_model_read(&teapot, "tests/golden/teapot.psr", NULL)
+	       || psr_model_read(&knot, "tests/golden/knot.psr", NULL);
 }
 
 static int close_model(void **state)
 {
 	(void)state;
 	psr_model_unref(teapot);
+	psr_model_unref(knot);
 	return 0;
 }
 
-static void draw(struct psr_frame *frame, uint32_t width, uint32_t height, enum psr_smooth smooth, struct psr_pool *pool)
+/* Draws octrees as splats. */
+static void draw_model(struct psr_frame *frame, struct psr_model *model, uint32_t width, uint32_t height,
+                       enum psr_smooth smooth, struct psr_pool *pool)
 {
-	const struct psr_model_info *info = psr_model_info(teapot);
+	const struct psr_model_info *info = psr_model_info(model);
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
 		                       .ambient = { 0.1, 0.1, 0.1 }, .background = { 0.01, 0.02, 0.03 } };
 	struct psr_settings settings;
 	struct psr_renderer *renderer;
 
-	instance = (struct psr_instance){ .model = teapot, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
 	psr_settings_default(&settings, width, height);
 	settings.smooth = smooth;
+	settings.with_splats = 1;
 	assert_int_equal(psr_frame_alloc(frame, width, height, PLANES, NULL), PSR_OK);
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	assert_int_equal(psr_render(renderer, &scene, &settings, pool, frame, NULL), PSR_OK);
 	psr_renderer_destroy(renderer);
+}
+
+static void draw(struct psr_frame *frame, uint32_t width, uint32_t height, enum psr_smooth smooth, struct psr_pool *pool)
+{
+	draw_model(frame, teapot, width, height, smooth, pool);
 }
 
 /* The code whose light is nearest to the mean of four, with light in steps of 2^-16. */
@@ -88,6 +98,19 @@ static void a_pixel_is_the_mean_of_four_of_a_smooth_picture_of_twice_the_size(vo
 	(void)state;
 	draw(&fine, 160, 120, PSR_SMOOTH_FINE, NULL);
 	draw(&twice, 320, 240, PSR_SMOOTH_EDGES, NULL);
+	assert_mean_of(&fine, &twice);
+	psr_frame_free(&fine);
+	psr_frame_free(&twice);
+}
+
+static void a_fine_octree_is_of_splats_as_the_smooth_one_is(void **state)
+{
+	struct psr_frame fine, twice;
+
+	(void)state;
+	draw_model(&fine, knot, 160, 120, PSR_SMOOTH_FINE, NULL);
+	draw_model(&twice, knot, 320, 240, PSR_SMOOTH_EDGES, NULL);
+	assert_int_equal(fine.report.effect[PSR_EFFECT_SPLATS].why, PSR_WHY_RAN);
 	assert_mean_of(&fine, &twice);
 	psr_frame_free(&fine);
 	psr_frame_free(&twice);
@@ -160,6 +183,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_pixel_is_the_mean_of_four_of_a_smooth_picture_of_twice_the_size),
+		cmocka_unit_test(a_fine_octree_is_of_splats_as_the_smooth_one_is),
 		cmocka_unit_test(windows_have_no_seams),
 		cmocka_unit_test(threads_and_instruction_sets_draw_the_same_bytes),
 		cmocka_unit_test(other_planes_and_smoothings_are_refused),

@@ -6,6 +6,8 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "plate.h"
+#include "model/blocks.h"
+#include "model/cubes.h"
 #include "psr/render.h"
 #include "render/need.h"
 
@@ -152,6 +154,51 @@ static void a_renderer_takes_no_more_than_was_foreseen(void **state)
 			}
 }
 
+static uint64_t splats_bytes(const struct psr_model *knot, uint32_t side, enum psr_smooth smooth)
+{
+	const struct psr_model_info *info = psr_model_info(knot);
+	const struct psr_instance instance = { .model = knot, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	struct psr_scene scene = { .n_instances = 1, .instance = &instance };
+	struct psr_renderer *renderer;
+	struct psr_settings settings;
+	struct psr_frame frame;
+	uint64_t bytes;
+
+	psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, 0.6, 1);
+	psr_settings_default(&settings, side, side);
+	settings.smooth = smooth;
+	settings.with_splats = 1;
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(psr_frame_alloc(&frame, side, side, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, NULL), PSR_OK);
+	assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+	bytes = psr_renderer_bytes(renderer);
+	psr_frame_free(&frame);
+	psr_renderer_destroy(renderer);
+	return bytes;
+}
+
+static void splats_take_no_more_than_was_foreseen(void **state)
+{
+	static const uint32_t sides[] = { 16, 200, 1000 };
+	struct psr_model *knot;
+
+	(void)state;
+	assert_int_equal(psr_model_read(&knot, "tests/golden/knot.psr", NULL), PSR_OK);
+	assert_int_equal(psr_model_make_cubes(knot, NULL), PSR_OK);
+	for (int i = 0; i < 3; i++)
+		for (int is_fine = 0; is_fine < 2; is_fine++) {
+			struct renderer_need need = { .width = sides[i], .height = sides[i], .pass = (unsigned)is_fine, .n_threads = 1,
+				                          .n_blocks = psr_model_cubes(knot)->groups.n_blocks, .with_splats = 1 };
+			const uint64_t bytes = splats_bytes(knot, sides[i], is_fine ? PSR_SMOOTH_FINE : PSR_SMOOTH_EDGES);
+
+			assert_true(bytes <= renderer_need(&need));
+			need.with_splats = 0;
+			if (i == 2) /* the reserve is smaller than what splats take */
+				assert_true(bytes > renderer_need(&need));
+		}
+	psr_model_unref(knot);
+}
+
 /* Pass 4 of 400x400 takes a second or more, and leaves no room for the other frame. It is drawn again afterwards. */
 static void a_refined_frame_gives_way_to_one_that_lacks_memory(void **state)
 {
@@ -187,6 +234,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_renderer_takes_no_more_than_was_foreseen),
+		cmocka_unit_test(splats_take_no_more_than_was_foreseen),
 		cmocka_unit_test_setup_teardown(glass_that_takes_more_than_max_memory_is_refused, add_panes, stop),
 		cmocka_unit_test_setup_teardown(glass_within_max_memory_is_drawn, add_panes, stop),
 		cmocka_unit_test_setup_teardown(a_refined_frame_gives_way_to_one_that_lacks_memory, add_panes, stop),

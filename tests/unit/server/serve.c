@@ -46,7 +46,7 @@ static void welcome_tells_the_limits(void **state)
 	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
 	                                           PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND | PSR_CAP_RMSE_BOUND |
 	                                           PSR_CAP_BOUND | PSR_CAP_FETCH | PSR_CAP_LEVELS | PSR_CAP_COLOR_BY |
-	                                           PSR_CAP_FINE);
+	                                           PSR_CAP_FINE | PSR_CAP_SPLATS);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -270,6 +270,33 @@ static void fine_pictures_have_colors_and_depths_and_no_passes(void **state)
 	frame.pass_limit = 1;
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
 	assert_non_null(strstr(text, "a fine picture"));
+	peer_close(&p);
+}
+
+static void splats_change_no_scene_without_an_octree(void **state)
+{
+	struct psr_msg_frame frame = frame_default(64, 48);
+	struct psr_msg_frame_begin begin;
+	struct psr_msg_frame_end plain, end;
+	struct psr_message message;
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
+	frame.settings = (struct psr_msg_settings){ .scale = 1, .spacing_px = 1 };
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &plain);
+	frame.settings.splats = 1;
+	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
+	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
+	assert_int_equal(begin.settings.splats, 1);
+	do
+		assert_true(peer_next(&p, &message));
+	while (message.type != PSR_MSG_FRAME_END);
+	assert_int_equal(psr_msg_frame_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
+	assert_true(end.hash[0] == plain.hash[0]);
+	for (int i = 0; i < end.n_entries; i++)
+		if (end.entry[i].id == PSR_WIRE_REPORT_EFFECTS + PSR_EFFECT_SPLATS)
+			assert_int_equal(end.entry[i].ns, PSR_WHY_NOTHING);
 	peer_close(&p);
 }
 
@@ -750,6 +777,7 @@ int main(void)
 		cmocka_unit_test(a_light_that_casts_shadows_gets_a_map),
 		cmocka_unit_test(settings_are_kept_and_returned),
 		cmocka_unit_test(fine_pictures_have_colors_and_depths_and_no_passes),
+		cmocka_unit_test(splats_change_no_scene_without_an_octree),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
 		cmocka_unit_test(a_cancel_keeps_the_view_of_its_id),
