@@ -70,7 +70,9 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 
 		summary->level_blocks[level]++;
 		summary->n_bent += (psr_blocks_traits(summary->blocks, b) & PSR_BLOCK_BENT) != 0;
-		summary->n_sheer += psr_blocks_is_sheer(summary->blocks, b) != 0;
+		/* Of materials, not of the coverage of things narrower than a sample. */
+		summary->n_sheer += psr_blocks_is_sheer(summary->blocks, b)
+		                    && (psr_blocks_traits(summary->blocks, b) & PSR_BLOCK_THIN) == 0;
 		summary->level_samples[level] += (uint64_t)__builtin_popcountll(summary->blocks->mask[b]);
 	}
 }
