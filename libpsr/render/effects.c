@@ -33,6 +33,9 @@ static const struct {
 	[PSR_EFFECT_SPLATS] = { "splats",
 	                        { "", "the settings turn it off", "no octree is in view; other instances are drawn as without",
 	                          "passes draw leaves as discs", "" } },
+	[PSR_EFFECT_FINE] = { "fine",
+	                      { "", "the settings turn it off", "", "samples are further apart than 1.25 pixels: smooth is nearer to "
+	                        "the truth; a finer model mends it", "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -57,6 +60,7 @@ const char *psr_effect_counts(enum psr_effect effect)
 		[PSR_EFFECT_SMOOTH] = "pixels at edges",
 		[PSR_EFFECT_SHEER] = "pixels with surfaces that let a part of the light through",
 		[PSR_EFFECT_SPLATS] = "leaves of octrees, as splats",
+		[PSR_EFFECT_FINE] = "pixels of four smooth ones",
 		[PSR_EFFECT_VEILS] = "pixels with things that are narrower than a sample's cell",
 	};
 

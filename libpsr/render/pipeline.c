@@ -269,6 +269,7 @@ static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_r
 
 	effect_note(report, PSR_EFFECT_SHEER, is_drawn && sheer->glass.any_blocks ? PSR_WHY_RAN : none,
 	            sheer->glass.n_pixels);
+	effect_note(report, PSR_EFFECT_FINE, PSR_WHY_OFF, 0);
 	effect_note(report, PSR_EFFECT_VEILS, is_drawn && sheer->thin.any_blocks ? PSR_WHY_RAN : none,
 	            sheer->thin.n_pixels);
 	return rc;

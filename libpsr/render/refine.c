@@ -5,6 +5,7 @@
 #include "base/mem.h"
 #include "base/root.h"
 #include "base/srgb.h"
+#include "fine.h"
 #include "placed.h"
 #include "refine.h"
 
@@ -28,6 +29,7 @@ struct refiner {
 	struct psr_renderer *renderer;
 	float *depth;        /* of a window, */
 	uint8_t *rgb;        /* and, of fine pictures, its colours; NULL before the first */
+	struct surveyor *surveyor; /* of fine pictures; NULL before the first */
 	uint8_t *is_inside; /* by pixel of the plain frame, then as much scratch */
 	size_t inside_size;
 	/* What is_inside was found for: the passes of a still share it. */
@@ -91,6 +93,7 @@ void refiner_destroy(struct refiner *r)
 		return;
 	psr_free(r->depth);
 	psr_free(r->rgb);
+	surveyor_destroy(r->surveyor);
 	psr_free_huge(r->is_inside, r->inside_size);
 	placed_clear(&r->placed);
 	free(r);
@@ -99,12 +102,12 @@ void refiner_destroy(struct refiner *r)
 uint64_t refiner_bytes(const struct refiner *r)
 {
 	return sizeof *r + WINDOW_PIXELS * (sizeof *r->depth + (r->rgb != NULL ? 3 : 0)) + r->inside_size
-	       + placed_bytes(&r->placed);
+	       + (r->surveyor != NULL ? surveyor_bytes() : 0) + placed_bytes(&r->placed);
 }
 
 uint64_t refiner_most_bytes(uint64_t n_pixels)
 {
-	return sizeof(struct refiner) + WINDOW_PIXELS * (sizeof(float) + 3) + 2 * n_pixels;
+	return sizeof(struct refiner) + surveyor_bytes() + WINDOW_PIXELS * (sizeof(float) + 3) + 2 * n_pixels;
 }
 
 uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
@@ -354,6 +357,18 @@ static int prepare(const struct still *still)
 	               ? PSR_OK : psr_fail(still->err, PSR_ERR_MEMORY, "no memory for a fine picture");
 }
 
+/* Instead of a fine picture. */
+static int draw_smooth(const struct still *still)
+{
+	struct render_settings smooth = *still->settings;
+
+	smooth.smooth = PSR_SMOOTH_EDGES;
+	const int rc = renderer_draw(still->refiner->renderer, still->scene, &smooth, still->pool, still->frame, still->err);
+
+	effect_note(&still->frame->report, PSR_EFFECT_FINE, PSR_WHY_VOID, 0);
+	return rc;
+}
+
 static uint32_t n_windows(uint32_t side, uint32_t window, uint32_t step)
 {
 	return side <= window ? 1 : 1 + (side - window + step - 1) / step;
@@ -379,6 +394,13 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	if (frame->normal != NULL || frame->id != NULL || frame->block != NULL || frame->weight != NULL
 	    || frame->words != NULL || frame->bound != NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "only colour and depth are refined, no other planes");
+	if (is_fine) {
+		int is_worth;
+
+		rc = fine_is_worth(&is_worth, &r->surveyor, scene, settings, err);
+		if (rc || !is_worth)
+			return rc ? rc : draw_smooth(&still);
+	}
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
@@ -388,5 +410,7 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x && rc == PSR_OK; i++)
 			rc = draw_window(&still, i, j);
+	effect_note(&frame->report, PSR_EFFECT_FINE, is_fine ? PSR_WHY_RAN : PSR_WHY_OFF,
+	            (uint64_t)settings->width * settings->height);
 	return rc;
 }

@@ -50,6 +50,11 @@ void surveyor_destroy(struct surveyor *surveyor)
 	free(surveyor);
 }
 
+size_t surveyor_bytes(void)
+{
+	return sizeof(struct surveyor);
+}
+
 static int make_room(struct surveyor *s)
 {
 	if (s->plan.n_groups > s->n_seen) {

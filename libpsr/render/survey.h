@@ -3,6 +3,7 @@
 #ifndef PSR_RENDER_SURVEY_H
 #define PSR_RENDER_SURVEY_H
 
+#include <stddef.h>
 #include "psr/scene.h"
 
 #define SURVEY_MOST 16
@@ -24,6 +25,7 @@ struct survey {
 struct surveyor; /* memory of surveys; one thread at a time */
 struct surveyor *surveyor_create(void); /* NULL without memory */
 void surveyor_destroy(struct surveyor *surveyor); /* NULL is fine */
+size_t surveyor_bytes(void); /* of one, its scene apart */
 
 /* Surveys a scene that psr_scene_validate() took, whose models are there, in a picture of this size; lights do not
  * matter. Fills at[0..n-1] for densities > 0, n at most SURVEY_MOST. Returns 0 if the scene has too many clusters, or

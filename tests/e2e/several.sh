@@ -69,15 +69,17 @@ check "--shadows changes the picture" [ "$(hashes --model teapot --shadows)" != 
 is "and is the same as a shadow of each light" "$(hashes --model wheel --light dir:1,-1,0,shadow --light dir:-1,-1,0,shadow)" \
 	"$(hashes --model wheel --light dir:1,-1,0 --light dir:-1,-1,0 --shadows)"
 
-# --- quality ---
-is "the default is fine" "$one" "$(hashes --model teapot --quality fine)"
-check "good is another picture" [ "$(hashes --model teapot --quality good)" != "$one" ]
-is "and smooth" "$(hashes --model teapot --smooth)" "$(hashes --model teapot --quality good)"
-is "planes that no fine picture has take a good one" "$(hashes --model teapot --quality good --plane normal)" \
-	"$(hashes --model teapot --plane normal)"
+# --- quality: a picture whose samples are near enough for a fine one ---
+small=$(hashes --model teapot --size 64x48)
+is "the default is fine" "$small" "$(hashes --model teapot --size 64x48 --quality fine)"
+check "good is another picture" [ "$(hashes --model teapot --size 64x48 --quality good)" != "$small" ]
+is "and smooth" "$(hashes --model teapot --size 64x48 --smooth)" "$(hashes --model teapot --size 64x48 --quality good)"
+is "planes that no fine picture has take a good one" "$(hashes --model teapot --size 64x48 --quality good --plane normal)" \
+	"$(hashes --model teapot --size 64x48 --plane normal)"
 refuses "unless somebody asks for a fine one" 4 "refines colour and depth" \
-	shot --model teapot --quality fine --plane normal --hash
-check "--no-smooth is another picture" [ "$(hashes --model teapot --no-smooth)" != "$one" ]
+	shot --model teapot --size 64x48 --quality fine --plane normal --hash
+check "--no-smooth is another picture" [ "$(hashes --model teapot --size 64x48 --no-smooth)" != "$small" ]
+is "what is too coarse for a fine picture gets a good one" "$one" "$(hashes --model teapot --quality good)"
 is "draft is a spacing of 2, not smooth" "$(hashes --model teapot --spacing 2 --no-smooth)" "$(hashes --model teapot --quality draft)"
 is "best is three passes" "$(hashes --model teapot --passes 3)" "$(hashes --model teapot --quality best)"
 

@@ -39,6 +39,7 @@ enum psr_effect {
 	PSR_EFFECT_SHEER,     /* count: pixels with translucent surfaces, veils left out */
 	PSR_EFFECT_VEILS,     /* count: pixels with things narrower than a sample's cell */
 	PSR_EFFECT_SPLATS,    /* count: leaves of octrees in view, drawn as splats ([B] 5.2) */
+	PSR_EFFECT_FINE,      /* count: pixels that are means of 2x2 smooth ones */
 	PSR_N_EFFECTS
 };
 enum psr_why {

@@ -1,0 +1,36 @@
+#include "fine.h"
+#include "groups.h"
+
+/* Pixels between samples of level 0, in the root mean square of a view, above which a fine picture is the smooth one. At
+ * twice the size a frame shows the shapes of its cells where samples are some three sub-pixels apart (decision 0133). */
+#define FINE_APART 1.25
+
+/* Splats mix their leaves, however wide. */
+static int is_all_splats(const struct psr_scene *scene, const struct render_settings *settings)
+{
+	for (uint32_t i = 0; i < scene->n_instances; i++)
+		if (!is_octree(&scene->instance[i]))
+			return 0;
+	return settings->with_ewa;
+}
+
+int fine_is_worth(int *is_worth, struct surveyor **surveyor, const struct psr_scene *scene,
+                  const struct render_settings *settings, struct psr_error *err)
+{
+	struct survey survey;
+	int rc = settings_validate(settings, err);
+
+	if (rc == PSR_OK)
+		rc = psr_scene_validate(scene, err);
+	if (rc)
+		return rc;
+	if (*surveyor == NULL)
+		*surveyor = surveyor_create();
+	if (*surveyor == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a fine picture");
+	/* What is too large for a survey has samples enough. */
+	*is_worth = is_all_splats(scene, settings)
+	            || !survey_scene(&survey, *surveyor, scene, settings->width, settings->height, NULL, 0)
+	            || survey.apart <= FINE_APART;
+	return PSR_OK;
+}
