@@ -1,3 +1,5 @@
+#include <math.h>
+#include <string.h>
 #include "groups.h"
 #include "render.h"
 
@@ -86,4 +88,31 @@ void representations_note(struct psr_report *report, const struct psr_scene *sce
 		report->drawn_as[as].n++;
 		report->drawn_as[as].n_automatic += scene->instance[i].representation == PSR_AUTOMATIC;
 	}
+}
+
+void report_add(struct psr_report *sum, const struct psr_report *one, unsigned pass)
+{
+	for (int s = 0; s < PSR_N_STAGES; s++) {
+		sum->ns[s] += one->ns[s];
+		sum->count[s] += one->count[s];
+	}
+	sum->n_blocks = one->n_blocks;
+	sum->n_samples = one->n_samples;
+	sum->n_blocks_drawn += one->n_blocks_drawn;
+	sum->n_samples_drawn += one->n_samples_drawn;
+	sum->n_covered += one->n_covered;
+	sum->n_filled += one->n_filled;
+	sum->levels |= one->levels;
+	sum->n_clamped += one->n_clamped;
+	memcpy(sum->drawn_as, one->drawn_as, sizeof sum->drawn_as);
+	if (one->octree_levels > sum->octree_levels) {
+		sum->octree_levels = one->octree_levels;
+		sum->of_levels = one->of_levels;
+	}
+	for (int e = 0; e < PSR_N_EFFECTS; e++) {
+		if (one->effect[e].why == PSR_WHY_RAN || sum->effect[e].why != PSR_WHY_RAN)
+			sum->effect[e].why = one->effect[e].why;
+		sum->effect[e].count += one->effect[e].count;
+	}
+	sum->error_px = fmax(sum->error_px, ldexp(one->error_px, -(int)pass));
 }

@@ -1,5 +1,6 @@
 #include "fine.h"
 #include "groups.h"
+#include "render.h"
 
 /* Pixels between samples of level 0, in the root mean square of a view, above which a fine picture is the smooth one. At
  * twice the size a frame shows the shapes of its cells where samples are some three sub-pixels apart (decision 0133). */

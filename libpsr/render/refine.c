@@ -183,33 +183,6 @@ static void average_row(int row, void *userdata)
 	}
 }
 
-static void add_report(struct psr_report *sum, const struct psr_report *one, unsigned pass)
-{
-	for (int s = 0; s < PSR_N_STAGES; s++) {
-		sum->ns[s] += one->ns[s];
-		sum->count[s] += one->count[s];
-	}
-	sum->n_blocks = one->n_blocks;
-	sum->n_samples = one->n_samples;
-	sum->n_blocks_drawn += one->n_blocks_drawn;
-	sum->n_samples_drawn += one->n_samples_drawn;
-	sum->n_covered += one->n_covered;
-	sum->n_filled += one->n_filled;
-	sum->levels |= one->levels;
-	sum->n_clamped += one->n_clamped;
-	memcpy(sum->drawn_as, one->drawn_as, sizeof sum->drawn_as);
-	if (one->octree_levels > sum->octree_levels) {
-		sum->octree_levels = one->octree_levels;
-		sum->of_levels = one->of_levels;
-	}
-	for (int e = 0; e < PSR_N_EFFECTS; e++) {
-		if (one->effect[e].why == PSR_WHY_RAN || sum->effect[e].why != PSR_WHY_RAN)
-			sum->effect[e].why = one->effect[e].why;
-		sum->effect[e].count += one->effect[e].count;
-	}
-	sum->error_px = fmax(sum->error_px, ldexp(one->error_px, -(int)pass));
-}
-
 static int loop(const struct still *still, int n, void (*fn)(int i, void *userdata), void *userdata)
 {
 	const int rc = psr_pool_for_until(still->pool, &still->settings->cancel, n, fn, userdata);
@@ -256,7 +229,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 		.stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
-	add_report(&frame->report, &fine.report, pass);
+	report_add(&frame->report, &fine.report, pass);
 	return loop(still, (int)((to_y - from_y) >> pass), average_row, &part);
 }
 
