@@ -78,7 +78,7 @@ static int see(struct calibration *c, struct psr_calibrated *out, const struct l
 	struct survey survey;
 
 	memset(out, 0, sizeof *out);
-	if (!survey_scene(&survey, c->surveyor, scene, view->width, view->height, &density, 1))
+	if (survey_scene(&survey, c->surveyor, scene, view->width, view->height, &density, 1) <= 0)
 		return psr_fail(c->err, PSR_ERR_LIMIT, "the model is too large to be calibrated");
 	out->apart = (float)fmax(survey.apart, LEAST_APART);
 	out->layers = (float)survey.layers;

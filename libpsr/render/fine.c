@@ -19,7 +19,7 @@ int fine_is_worth(int *is_worth, struct surveyor **surveyor, const struct psr_sc
                   const struct render_settings *settings, struct psr_error *err)
 {
 	struct survey survey;
-	int rc = settings_validate(settings, err);
+	int known = 0, rc = settings_validate(settings, err);
 
 	if (rc == PSR_OK)
 		rc = psr_scene_validate(scene, err);
@@ -29,9 +29,11 @@ int fine_is_worth(int *is_worth, struct surveyor **surveyor, const struct psr_sc
 		*surveyor = surveyor_create();
 	if (*surveyor == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a fine picture");
-	/* What is too large for a survey has samples enough. */
-	*is_worth = is_all_splats(scene, settings)
-	            || !survey_scene(&survey, *surveyor, scene, settings->width, settings->height, NULL, 0)
-	            || survey.apart <= FINE_APART;
+	if (!is_all_splats(scene, settings))
+		known = survey_scene(&survey, *surveyor, scene, settings->width, settings->height, NULL, 0);
+	if (known < 0) /* no picture may depend on the memory that is left */
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a fine picture");
+	/* A scene of too many clusters for a survey is taken for one of samples enough. */
+	*is_worth = known == 0 || survey.apart <= FINE_APART;
 	return PSR_OK;
 }

@@ -259,5 +259,5 @@ int survey_scene(struct survey *survey, struct surveyor *surveyor, const struct 
 	if (is_made)
 		count(survey, surveyor, density, n);
 	fesetenv(&callers);
-	return is_made;
+	return is_made ? 1 : -1;
 }

@@ -28,8 +28,8 @@ void surveyor_destroy(struct surveyor *surveyor); /* NULL is fine */
 size_t surveyor_bytes(void); /* of one, its scene apart */
 
 /* Surveys a scene that psr_scene_validate() took, whose models are there, in a picture of this size; lights do not
- * matter. Fills at[0..n-1] for densities > 0, n at most SURVEY_MOST. Returns 0 if the scene has too many clusters, or
- * there is no memory: then nothing is known. */
+ * matter. Fills at[0..n-1] for densities > 0, n at most SURVEY_MOST. Returns 1; 0 if the scene has too many clusters,
+ * -1 if there is no memory: then nothing is known. */
 int survey_scene(struct survey *survey, struct surveyor *surveyor, const struct psr_scene *scene, uint32_t width,
                  uint32_t height, const double *density, int n);
 

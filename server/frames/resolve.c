@@ -76,7 +76,7 @@ static void see(struct budget_view *view, const struct drawing *d, struct survey
 	budget_densities(density);
 	scene.camera = request->camera;
 	if (surveyor == NULL
-	    || !survey_scene(&survey, surveyor, &scene, request->width, request->height, density, BUDGET_RUNGS)) {
+	    || survey_scene(&survey, surveyor, &scene, request->width, request->height, density, BUDGET_RUNGS) <= 0) {
 		guess(view, d->scene, density, &request->camera);
 		foresee(view, d->scene, NULL);
 		return;
