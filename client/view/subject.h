@@ -80,8 +80,9 @@ int subject_scale_instance(struct subject *subject, const struct link_scene *sce
 
 /* Whether each of these models can be coloured by this number; what a server does not tell: by heights alone. */
 int subject_has_color(const struct link_scene *scene, uint8_t color_by);
-/* Colours by the next number that the models have, and after the last one as they are. scene NULL: as they are. */
-void subject_next_color(struct subject *subject, const struct link_scene *scene);
+/* Colours by the next number that the models have, and after the last one as they are. scene NULL: as they are. Writes
+ * what a viewer says of it. */
+void subject_next_color(struct subject *subject, const struct link_scene *scene, char *note, size_t note_size);
 /* UNSUPPORTED: a model of the scene does not have the number; colours are its own now. */
 int subject_check_color(struct subject *subject, const struct link_scene *scene, struct psr_error *err);
 

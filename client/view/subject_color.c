@@ -1,6 +1,8 @@
 /* Colours that tell a number of each point: which ones the models have, and the next one. */
 #include "subject.h"
 
+#include <stdio.h>
+
 static int has_color(const struct psr_msg_opened *model, uint8_t color_by)
 {
 	const uint8_t colors = model->colors != 0 ? model->colors : 1 << PSR_WIRE_COLOR_HEIGHT;
@@ -16,7 +18,7 @@ int subject_has_color(const struct link_scene *scene, uint8_t color_by)
 	return 1;
 }
 
-void subject_next_color(struct subject *subject, const struct link_scene *scene)
+void subject_next_color(struct subject *subject, const struct link_scene *scene, char *note, size_t note_size)
 {
 	uint8_t by = subject->color_by;
 
@@ -24,6 +26,10 @@ void subject_next_color(struct subject *subject, const struct link_scene *scene)
 		by = (uint8_t)(by == PSR_WIRE_COLOR_RETURN ? PSR_WIRE_COLOR_OWN : by + 1);
 	while (by != PSR_WIRE_COLOR_OWN && (scene == NULL || !subject_has_color(scene, by)));
 	subject->color_by = by;
+	if (by != PSR_WIRE_COLOR_OWN)
+		snprintf(note, note_size, "coloured by %s", scene_colors[by]);
+	else
+		snprintf(note, note_size, "the model's own colours");
 }
 
 int subject_check_color(struct subject *subject, const struct link_scene *scene, struct psr_error *err)

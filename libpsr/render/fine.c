@@ -19,18 +19,17 @@ int fine_is_worth(int *is_worth, struct surveyor **surveyor, const struct psr_sc
                   const struct render_settings *settings, struct psr_error *err)
 {
 	struct survey survey;
-	int known = 0, rc = settings_validate(settings, err);
+	int rc = settings_validate(settings, err);
 
 	if (rc == PSR_OK)
 		rc = psr_scene_validate(scene, err);
-	if (rc)
+	*is_worth = rc == PSR_OK && is_all_splats(scene, settings);
+	if (rc || *is_worth)
 		return rc;
 	if (*surveyor == NULL)
 		*surveyor = surveyor_create();
-	if (*surveyor == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a fine picture");
-	if (!is_all_splats(scene, settings))
-		known = survey_scene(&survey, *surveyor, scene, settings->width, settings->height, NULL, 0);
+	const int known = *surveyor == NULL ? -1 : survey_scene(&survey, *surveyor, scene, settings->width, settings->height,
+	                                                        NULL, 0);
 	if (known < 0) /* no picture may depend on the memory that is left */
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a fine picture");
 	/* A scene of too many clusters for a survey is taken for one of samples enough. */

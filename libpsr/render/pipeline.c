@@ -269,7 +269,6 @@ static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_r
 
 	effect_note(report, PSR_EFFECT_SHEER, is_drawn && sheer->glass.any_blocks ? PSR_WHY_RAN : none,
 	            sheer->glass.n_pixels);
-	effect_note(report, PSR_EFFECT_FINE, PSR_WHY_OFF, 0);
 	effect_note(report, PSR_EFFECT_VEILS, is_drawn && sheer->thin.any_blocks ? PSR_WHY_RAN : none,
 	            sheer->thin.n_pixels);
 	return rc;
@@ -368,6 +367,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	report->count[PSR_STAGE_SMOOTH] = smooth == PSR_WHY_RAN ? r->smooth.n_edges : 0;
 	note_time(report, PSR_STAGE_SMOOTH, &start);
 	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
+	effect_note(report, PSR_EFFECT_FINE, PSR_WHY_OFF, 0); /* refiner_draw() says where it runs */
 	rc = add_sheer(r, pool, report);
 	note_time(report, PSR_STAGE_SHADE, &start);
 	return rc ? explain(rc, r, "the sheer surfaces of", err) : PSR_OK;

@@ -5,28 +5,7 @@
 # pictures and not in files of numbers; in suites, loads, reports and turntables; and models without the number.
 . "$(dirname "$0")/lib.sh"
 
-# 30,000 points of a ball: classes 2 and 6 by halves, returns by thirds from top to bottom, intensity by height.
-python3 - "$work/ball.las" <<'END'
-import math, random, struct, sys
-random.seed(1)
-n = 30000
-header = bytearray(227)
-header[0:4] = b"LASF"
-header[24:26] = bytes([1, 2])
-struct.pack_into("<HI", header, 94, 227, 227)
-struct.pack_into("<BHI", header, 104, 0, 20, n)
-struct.pack_into("<6d", header, 131, 0.001, 0.001, 0.001, 412000.0, 5312000.0, 120.0)
-with open(sys.argv[1], "wb") as f:
-    f.write(header)
-    for i in range(n):
-        z = 2 * random.random() - 1
-        a = 2 * math.pi * random.random()
-        r = math.sqrt(1 - z * z)
-        at = [round(10000 * c) for c in (r * math.cos(a), r * math.sin(a), z)]
-        number = 1 if z > 1 / 3 else 2 if z > -1 / 3 else 3
-        kind = 2 if at[0] > 0 else 6
-        f.write(struct.pack("<3iHBBBBH", *at, int(30000 * (1 - z)), number | 3 << 3, kind, 0, 0, 0))
-END
+python3 tests/e2e/ball.py "$work/ball.las" 30000 scan
 mkdir "$work/models"
 octree=(--representation octree --levels 7 -q)
 psr-model build "$work/ball.las" "${octree[@]}" --scan -o "$work/models/plain.psr"

@@ -4,27 +4,7 @@
 # pictures by psrd.
 . "$(dirname "$0")/lib.sh"
 
-# 60,000 points of a ball of radius 10 at survey coordinates, red above and blue below, in no order.
-python3 - "$work/ball.las" <<'END'
-import math, random, struct, sys
-random.seed(1)
-n = 60000
-header = bytearray(227)
-header[0:4] = b"LASF"
-header[24:26] = bytes([1, 2])
-struct.pack_into("<HI", header, 94, 227, 227)
-struct.pack_into("<BHI", header, 104, 2, 26, n)
-struct.pack_into("<6d", header, 131, 0.001, 0.001, 0.001, 412000.0, 5312000.0, 120.0)
-with open(sys.argv[1], "wb") as f:
-    f.write(header)
-    for i in range(n):
-        z = 2 * random.random() - 1
-        a = 2 * math.pi * random.random()
-        r = math.sqrt(1 - z * z)
-        at = [round(10000 * c) for c in (r * math.cos(a), r * math.sin(a), z)]
-        color = (60000, 5000, 5000) if z > 0 else (5000, 5000, 60000)
-        f.write(struct.pack("<3iHBBBBH3H", *at, 0, 0, 2, 0, 0, 0, *color))
-END
+python3 tests/e2e/ball.py "$work/ball.las" 60000 colors
 
 value() { # key of the JSON object FILE.json
 	python3 -c 'import functools, json, sys

@@ -62,15 +62,6 @@ static void toggle(struct viewer *viewer, const char *what, int *is)
 	snprintf(viewer->note, sizeof viewer->note, "%s %s", what, *is ? "on" : "off");
 }
 
-static void next_color(struct viewer *viewer)
-{
-	subject_next_color(&viewer->subject, viewer->scene);
-	if (viewer->subject.color_by != PSR_WIRE_COLOR_OWN)
-		snprintf(viewer->note, sizeof viewer->note, "coloured by %s", scene_colors[viewer->subject.color_by]);
-	else
-		snprintf(viewer->note, sizeof viewer->note, "the model's own colours");
-}
-
 /* 0: no key of a camera. */
 static int camera_key(struct viewer *viewer, int key)
 {
@@ -120,7 +111,7 @@ void keys_event(struct viewer *viewer, const struct input_event *event)
 	else if (event->key == 'i')
 		toggle(viewer, "inertia", &viewer->hand.has_inertia);
 	else if (event->key == 'v')
-		next_color(viewer);
+		subject_next_color(&viewer->subject, viewer->scene, viewer->note, sizeof viewer->note);
 	else if (event->key == '?')
 		snprintf(viewer->note, sizeof viewer->note, "drag: turn, ctrl-drag: move, wheel +-: zoom, arrows, "
 		         "1-6 sides, h home, o ortho, s shadows, a smooth, v colours, q quit");

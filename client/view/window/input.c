@@ -204,11 +204,10 @@ static void next_stage(struct viewer *viewer)
 
 static void next_color(struct viewer *viewer)
 {
-	subject_next_color(&viewer->subject, viewer->scene);
-	if (viewer->subject.color_by != PSR_WIRE_COLOR_OWN)
-		viewer_note(viewer, "coloured by %s", scene_colors[viewer->subject.color_by]);
-	else
-		viewer_note(viewer, "the model's own colours");
+	char note[64];
+
+	subject_next_color(&viewer->subject, viewer->scene, note, sizeof note);
+	viewer_note(viewer, "%s", note);
 }
 
 static void next_background(struct viewer *viewer)

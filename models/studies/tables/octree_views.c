@@ -84,33 +84,50 @@ static int time_view(double seconds[2], struct study *study, const struct psr_mo
 	return PSR_OK;
 }
 
-/* Sums of squares over covered pixels, for decibels. */
+/* Of the views of a model. */
 struct sums {
-	double square[2];
-	uint64_t n, n_wrong[2], n_inside; /* wrong: holes and leaks, of pixels inside */
+	double square, square_inside; /* over pixels that are covered; inside: for decibels */
+	double n, n_inside, n_wrong;  /* of these; wrong: holes and leaks */
 };
 
-static int judge_view(struct sums *sums, struct study *study, const struct psr_model *const model[2], struct stage *stage,
-                      const struct psr_frame *frame, const struct psr_source_planes *truth)
+static int add_errors(struct sums *sums, struct study *study, const struct psr_model *model,
+                      const struct psr_frame *drawn, const struct psr_source_planes *truth)
+{
+	struct psr_errors errors;
+	const int rc = psr_errors_measure(&errors, drawn, truth, psr_model_info(model)->spacing, study->err);
+
+	if (rc != PSR_OK)
+		return rc;
+	sums->square += pow(10, -errors.psnr / 10) * (double)errors.n_covered;
+	sums->square_inside += pow(10, -errors.psnr_inside / 10) * (double)errors.n_inside;
+	sums->n += (double)errors.n_covered;
+	sums->n_inside += (double)errors.n_inside;
+	sums->n_wrong += (double)(errors.n_holes + errors.n_leaks);
+	return PSR_OK;
+}
+
+static struct octree_drawn drawn_of(const struct sums *sums, double seconds)
+{
+	return (struct octree_drawn){ .fps = OCTREE_VIEWS / seconds, .db = -10 * log10(sums->square / sums->n),
+		                          .wrong = 1e6 * sums->n_wrong / sums->n_inside,
+		                          .inside_db = -10 * log10(sums->square_inside / sums->n_inside) };
+}
+
+static int judge_view(struct sums sums[2], struct study *study, const struct psr_model *const model[2],
+                      struct stage *stage, const struct psr_frame *frame, const struct psr_source_planes *truth)
 {
 	struct render_settings settings;
 
 	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
 	for (int m = 0; m < 2; m++) {
-		struct psr_errors errors;
 		struct psr_frame drawn = *frame;
-		int rc;
 
 		stage->instance.model = model[m];
-		rc = renderer_draw(study->renderer, &stage->scene, &settings, study->pool, &drawn, study->err);
+		int rc = renderer_draw(study->renderer, &stage->scene, &settings, study->pool, &drawn, study->err);
 		if (rc == PSR_OK)
-			rc = psr_errors_measure(&errors, &drawn, truth, psr_model_info(model[m])->spacing, study->err);
+			rc = add_errors(&sums[m], study, model[m], &drawn, truth);
 		if (rc != PSR_OK)
 			return rc;
-		sums->square[m] += pow(10, -errors.psnr / 10) * (double)errors.n_covered;
-		sums->n_wrong[m] += errors.n_holes + errors.n_leaks;
-		sums->n += m == 0 ? errors.n_covered : 0;
-		sums->n_inside += m == 0 ? errors.n_inside : 0;
 	}
 	return PSR_OK;
 }
@@ -119,7 +136,7 @@ int octree_compare(struct octree_drawn drawn[2], struct study *study, const stru
                    const struct psr_model *const model[2], const struct octree_truth *truth)
 {
 	struct psr_frame quiet = { .width = OCTREE_SIDE, .height = OCTREE_SIDE, .rgb = truth->frame.rgb };
-	struct sums sums = { .n = 0 };
+	struct sums sums[2] = { { .n = 0 } };
 	double seconds[2] = { 0, 0 };
 
 	for (int v = 0; v < OCTREE_VIEWS; v++) {
@@ -129,26 +146,23 @@ int octree_compare(struct octree_drawn drawn[2], struct study *study, const stru
 		set_stage(&stage, of, directions[v]);
 		rc = time_view(seconds, study, model, &stage, &quiet);
 		if (rc == PSR_OK)
-			rc = judge_view(&sums, study, model, &stage, &truth->frame, &truth->view[v]);
+			rc = judge_view(sums, study, model, &stage, &truth->frame, &truth->view[v]);
 		if (rc != PSR_OK)
 			return rc;
 	}
 	for (int m = 0; m < 2; m++)
-		drawn[m] = (struct octree_drawn){ .fps = OCTREE_VIEWS / seconds[m],
-			                              .db = -10 * log10(sums.square[m] / (double)sums.n),
-			                              .wrong = 1e6 * (double)sums.n_wrong[m] / (double)sums.n_inside };
+		drawn[m] = drawn_of(&sums[m], seconds[m]);
 	return PSR_OK;
 }
 
 int octree_score(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
                  const struct psr_model *model, const struct psr_settings *settings, const struct octree_truth *truth)
 {
-	double square = 0, square_inside = 0, n = 0, n_inside = 0, n_wrong = 0;
+	struct sums sums = { .n = 0 };
 	uint64_t ns = 0;
 
 	for (int v = 0; v < OCTREE_VIEWS; v++) {
 		struct psr_frame frame = truth->frame;
-		struct psr_errors errors;
 		struct stage stage;
 		int rc;
 
@@ -158,19 +172,13 @@ int octree_score(struct octree_drawn *drawn, struct study *study, const struct s
 		if (rc == PSR_OK) /* the first one warms */
 			rc = psr_render(study->renderer, &stage.scene, settings, study->pool, &frame, study->err);
 		if (rc == PSR_OK)
-			rc = psr_errors_measure(&errors, &frame, &truth->view[v], psr_model_info(model)->spacing, study->err);
+			rc = add_errors(&sums, study, model, &frame, &truth->view[v]);
 		if (rc != PSR_OK)
 			return rc;
 		for (int s = 0; s < PSR_N_STAGES; s++)
 			ns += frame.report.ns[s];
-		square += pow(10, -errors.psnr / 10) * (double)errors.n_covered;
-		square_inside += pow(10, -errors.psnr_inside / 10) * (double)errors.n_inside;
-		n += (double)errors.n_covered;
-		n_inside += (double)errors.n_inside;
-		n_wrong += (double)(errors.n_holes + errors.n_leaks);
 	}
-	*drawn = (struct octree_drawn){ .fps = OCTREE_VIEWS / ((double)ns * 1e-9), .db = -10 * log10(square / n),
-		                            .wrong = 1e6 * n_wrong / n_inside, .inside_db = -10 * log10(square_inside / n_inside) };
+	*drawn = drawn_of(&sums, (double)ns * 1e-9);
 	return PSR_OK;
 }
 

@@ -105,6 +105,22 @@ static void glass_within_max_memory_is_drawn(void **state)
 		peer_close(&peer[i]);
 }
 
+/* Returns what a renderer takes that has drawn the scene once. */
+static uint64_t bytes_of(const struct psr_scene *scene, const struct psr_settings *settings, struct psr_pool *pool)
+{
+	struct psr_renderer *renderer;
+	struct psr_frame frame;
+
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(psr_frame_alloc(&frame, settings->width, settings->height,
+	                                 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, NULL), PSR_OK);
+	assert_int_equal(psr_render(renderer, scene, settings, pool, &frame, NULL), PSR_OK);
+	const uint64_t bytes = psr_renderer_bytes(renderer);
+	psr_frame_free(&frame);
+	psr_renderer_destroy(renderer);
+	return bytes;
+}
+
 /* Panes that fill the picture, drawn with three threads. */
 static uint64_t renderer_bytes(uint32_t width, uint32_t height, unsigned pass, uint8_t opacity)
 {
@@ -112,11 +128,8 @@ static uint64_t renderer_bytes(uint32_t width, uint32_t height, unsigned pass, u
 	struct psr_model *pane = pane_create(0x2040c0, opacity);
 	struct psr_scene scene = { .n_instances = N_PANES, .instance = instance,
 		                       .camera = { .eye = { 0, 0, 2 }, .up = { 0, 1, 0 }, .fov_y = 0.6, .near_z = 0.01 } };
-	struct psr_renderer *renderer;
 	struct psr_settings settings;
-	struct psr_frame frame;
 	struct psr_pool *pool;
-	uint64_t bytes;
 
 	for (int i = 0; i < N_PANES; i++)
 		instance[i] = (struct psr_instance){ .model = pane, .rotation = { 0, 0, 0, 1 }, .translation = { 0, 0, -i },
@@ -125,12 +138,7 @@ static uint64_t renderer_bytes(uint32_t width, uint32_t height, unsigned pass, u
 	settings.pass = pass;
 	settings.smooth = 1;
 	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
-	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
-	assert_int_equal(psr_frame_alloc(&frame, width, height, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, NULL), PSR_OK);
-	assert_int_equal(psr_render(renderer, &scene, &settings, pool, &frame, NULL), PSR_OK);
-	bytes = psr_renderer_bytes(renderer);
-	psr_frame_free(&frame);
-	psr_renderer_destroy(renderer);
+	const uint64_t bytes = bytes_of(&scene, &settings, pool);
 	psr_pool_destroy(pool);
 	psr_model_unref(pane);
 	return bytes;
@@ -159,22 +167,13 @@ static uint64_t splats_bytes(const struct psr_model *knot, uint32_t side, enum p
 	const struct psr_model_info *info = psr_model_info(knot);
 	const struct psr_instance instance = { .model = knot, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	struct psr_scene scene = { .n_instances = 1, .instance = &instance };
-	struct psr_renderer *renderer;
 	struct psr_settings settings;
-	struct psr_frame frame;
-	uint64_t bytes;
 
 	psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, 0.6, 1);
 	psr_settings_default(&settings, side, side);
 	settings.smooth = smooth;
 	settings.with_splats = 1;
-	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
-	assert_int_equal(psr_frame_alloc(&frame, side, side, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, NULL), PSR_OK);
-	assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
-	bytes = psr_renderer_bytes(renderer);
-	psr_frame_free(&frame);
-	psr_renderer_destroy(renderer);
-	return bytes;
+	return bytes_of(&scene, &settings, NULL);
 }
 
 static void splats_take_no_more_than_was_foreseen(void **state)
