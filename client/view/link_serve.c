@@ -25,6 +25,7 @@ struct serve {
 	uint64_t n_received, heard_ns; /* bytes, when the last came */
 	int is_pinged;
 	int is_refused;              /* until the wish changes, or a retry */
+	int is_scene_refused;        /* of this wish: its frames fail, too, for want of it, and that is no reason to tell */
 	struct psr_error beside;     /* why a model is not there, or no finer one; code 0: all are */
 	uint64_t again_ns;           /* when such a model is asked for again; PACE_NEVER: once the wish changes */
 };
@@ -95,7 +96,7 @@ static int take_wish(struct serve *serve, struct psr_error *err)
 		return psr_fail(err, code, "no memory for the instances of a scene");
 	if (!is_new)
 		return PSR_OK;
-	serve->is_refused = 0;
+	serve->is_refused = serve->is_scene_refused = 0;
 	if (!is_arranged) {
 		memset(&serve->beside, 0, sizeof serve->beside);
 		serve->again_ns = 0;
@@ -126,10 +127,15 @@ static int read_all(struct serve *serve, struct psr_error *err)
 	while ((got = psr_client_wait(serve->client, 0, &event, err)) > 0) {
 		if (link_probe_event(&serve->probe, serve->link, &event))
 			continue;
-		if (link_view_event(&serve->view, &event, &why))
-			refuse(serve, &why);
-		else if (event.type == PSR_EVENT_FRAME && event.id == serve->view.newest)
-			serve->is_refused = 0;
+		const int is_newest = event.id == serve->view.newest;
+
+		if (link_view_event(&serve->view, &event, &why)) {
+			serve->is_scene_refused |= !is_newest;
+			if (!is_newest || !serve->is_scene_refused)
+				refuse(serve, &why);
+		} else if (event.type == PSR_EVENT_FRAME && is_newest) {
+			serve->is_refused = serve->is_scene_refused = 0;
+		}
 	}
 	if (psr_client_bytes_received(serve->client) != serve->n_received) {
 		pthread_mutex_lock(&serve->link->lock);
