@@ -2,8 +2,8 @@
 # needs: psr-model
 # Real models through the whole path - build, psrd, psr shot - against the ray-traced truth of the mesh, same camera.
 . "$(dirname "$0")/lib.sh"
-resolution=512
-models=$BUILD/test-models/accuracy
+resolution=384
+models=$BUILD/test-models/accuracy-$resolution
 mkdir -p "$models"
 
 # Numbers of one view; the bounds are those of the issue: silhouettes within a pixel, holes below 0.1 %, the distance along the

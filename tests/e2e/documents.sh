@@ -23,31 +23,32 @@ long_lines() {
 
 # The targets of [text](target) outside of code, without those of other hosts and of this page's own headings.
 dead_links() {
-	local page target
-	for page; do
-		sed '/^```/,/^```/d;s/`[^`]*`//g' "$page" | grep -oE '\]\([^)]+\)' | sed 's/^](//;s/)$//;s/#.*//' |
-			while read -r target; do
-				case $target in
-				'' | *://* | mailto:*) ;;
-				*) [ -e "$(dirname "$page")/$target" ] || echo "$page: $target" ;;
-				esac
-			done
-	done
+	perl -MFile::Basename -ne '
+		if (/^```/) { $in_code = !$in_code }
+		elsif (!$in_code) {
+			s/`[^`]*`//g;
+			for (/\]\(([^)]+)\)/g) {
+				next if m{://|^mailto:};
+				s/#.*//;
+				print "$ARGV: $_\n" unless $_ eq "" || -e dirname($ARGV) . "/$_";
+			}
+		}
+		$in_code = 0 if eof' "$@"
 }
 
 long_pages() { # most page...
-	local most=$1 page n
+	local most=$1
 	shift
-	for page; do
-		n=$(wc -l <"$page")
-		[ "$n" -le "$most" ] || echo "$page: $n lines"
-	done
+	awk -v most="$most" '
+		FNR > most { n[FILENAME] = FNR }
+		END { for (page in n) print page ": " n[page] " lines" }' "$@"
 }
 
 not_in_index() { # decision...
-	local page
+	local page index
+	index=$(<docs/decisions/README.md)
 	for page; do
-		grep -qF "(${page##*/})" docs/decisions/README.md || echo "$page"
+		[[ $index == *"(${page##*/})"* ]] || echo "$page"
 	done
 }
 
@@ -62,15 +63,12 @@ wide_table() {
 	local row
 	for row in one another; do
 		printf '%-9s' "$row"
-		for i in $(seq 20); do printf ' %8s' "$row$i"; done
+		for i in {1..20}; do printf ' %8s' "$row$i"; done
 		echo
 	done
 }
 lost_words() { # table: words that fold.awk leaves out
-	local word
-	for word in $(cat "$1"); do
-		awk -f docs/fold.awk "$1" | grep -qw "$word" || echo "$word"
-	done
+	comm -23 <(tr -s ' ' '\n' <"$1" | sort -u) <(awk -f docs/fold.awk "$1" | tr -s ' ' '\n' | sort -u)
 }
 
 check "there are documents" test ${#pages[@]} -gt 0

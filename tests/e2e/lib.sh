@@ -90,7 +90,7 @@ stop_psrd() { # returns psrd's exit status
 }
 
 number() { # file key: the number of a key in a JSON file of ours
-	sed -n "s/.*\"$2\":[[:space:]]*\\([-+0-9.eE]*\\).*/\\1/p" "$1" | head -n 1
+	[[ $(<"$1") =~ \"$2\":[[:space:]]*([-+0-9.eE]*) ]] && echo "${BASH_REMATCH[1]}"
 }
 array() { # file key: the numbers of an array in a JSON file of ours, apart by blanks
 	tr -d '\n\t ' <"$1" | sed -n "s/.*\"$2\":\[\([^]]*\)\].*/\1/p" | tr ',' ' '

@@ -45,20 +45,17 @@ static struct psr_model *any_model(void)
 /* Draws a request, or returns the code of its error. A picture has no NaN and no depth of 0 or less. */
 static int answer(const struct request *r, struct psr_error *err)
 {
-	struct psr_renderer *renderer;
 	struct psr_frame frame;
 	int rc = psr_frame_alloc(&frame, r->settings.width, r->settings.height,
 	                         1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, err);
 
 	if (rc)
 		return rc;
-	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
-	rc = psr_render(renderer, &r->scene, &r->settings, NULL, &frame, err);
+	rc = psr_render(hard_renderer(), &r->scene, &r->settings, NULL, &frame, err);
 	for (size_t i = 0; i < (size_t)frame.width * frame.height && rc == PSR_OK; i++)
 		if (!(frame.depth[i] > 0))
 			fail_msg("pixel %zu has the depth %g", i, (double)frame.depth[i]);
 	assert_true(rc || (frame.report.error_px >= 0 && isfinite(frame.report.error_px)));
-	psr_renderer_destroy(renderer);
 	psr_frame_free(&frame);
 	return rc;
 }

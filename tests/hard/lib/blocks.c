@@ -320,29 +320,28 @@ static void check_frame(const struct psr_frame *frame)
 	assert_true(frame->report.error_px >= 0 && isfinite(frame->report.error_px));
 }
 
-static struct psr_renderer *begin(struct psr_frame *frame, uint32_t width, uint32_t height, unsigned planes)
+struct psr_renderer *hard_renderer(void)
 {
-	struct psr_renderer *renderer;
+	static struct psr_renderer *renderer;
 
-	assert_int_equal(psr_frame_alloc(frame, width, height, planes, NULL), PSR_OK);
-	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	if (renderer == NULL)
+		assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	return renderer;
 }
 
-static void end(struct psr_renderer *renderer, const struct psr_frame *frame, int rc, const struct psr_error *err)
+static void end(const struct psr_frame *frame, int rc, const struct psr_error *err)
 {
 	if (rc)
 		fail_msg("%s", err->text);
-	psr_renderer_destroy(renderer);
 	check_frame(frame);
 }
 
 void hard_draw_with(struct psr_frame *frame, const struct psr_scene *scene, const struct render_settings *settings)
 {
-	struct psr_renderer *renderer = begin(frame, settings->width, settings->height, (1u << PSR_N_PLANES) - 1);
 	struct psr_error err;
 
-	end(renderer, frame, renderer_draw(renderer, scene, settings, NULL, frame, &err), &err);
+	assert_int_equal(psr_frame_alloc(frame, settings->width, settings->height, HARD_ALL_PLANES, NULL), PSR_OK);
+	end(frame, renderer_draw(hard_renderer(), scene, settings, NULL, frame, &err), &err);
 }
 
 void hard_draw(struct psr_frame *frame, const struct psr_scene *scene, uint32_t width, uint32_t height)
@@ -355,11 +354,11 @@ void hard_draw(struct psr_frame *frame, const struct psr_scene *scene, uint32_t 
 
 void hard_draw_pass(struct psr_frame *frame, const struct psr_scene *scene, const struct psr_settings *settings)
 {
-	struct psr_renderer *renderer =
-		begin(frame, settings->width, settings->height, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH);
+	const unsigned planes = 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH;
 	struct psr_error err;
 
-	end(renderer, frame, psr_render(renderer, scene, settings, NULL, frame, &err), &err);
+	assert_int_equal(psr_frame_alloc(frame, settings->width, settings->height, planes, NULL), PSR_OK);
+	end(frame, psr_render(hard_renderer(), scene, settings, NULL, frame, &err), &err);
 }
 
 void hard_same_planes(const struct psr_frame *a, const struct psr_frame *b, unsigned planes)

@@ -10,11 +10,9 @@
 #define HARD_CASES(n) ((n) / 50 + 1)
 #else
 #define HARD_CASES(n) (n)
-/* Fails unless the planes, a set of bits 1 << enum psr_plane, have the same bytes in both frames. */
-void hard_same_planes(const struct psr_frame *a, const struct psr_frame *b, unsigned planes);
-#define HARD_ALL_PLANES ((1u << PSR_N_PLANES) - 1)
-
 #endif
+
+#define HARD_ALL_PLANES ((1u << PSR_N_PLANES) - 1)
 
 void hard_direction(double d[3], uint64_t *seed); /* uniform, of length 1 */
 
@@ -67,6 +65,9 @@ struct psr_model *hard_sheet(const struct hard_sheet *sheet);
 void hard_position(double at[3], const struct psr_blocks *blocks, uint32_t block, uint32_t sample);
 
 struct psr_instance hard_place(const struct psr_model *model); /* where the model's own coordinates put it */
+
+/* The renderer of all frames of a program, as in psrd: no frame is to spoil it for those that follow. */
+struct psr_renderer *hard_renderer(void);
 
 /* Draws all planes of a frame, which psr_frame_free() frees, by default settings or by the caller's. Fails if a depth
  * is NaN or not positive, if a word is no depth, or if the report's error is not finite. */

@@ -18,6 +18,8 @@
 #define TRIALS_SHARE 1
 #endif
 #define CANARY 0xa5
+#define MOST_SPARE 512
+#define MOST_SPARE_BYTES ((size_t)1 << 20)
 #define BENCH_ROUNDS 8
 #define ROUND_NS 2e7
 
@@ -72,6 +74,40 @@ float check_plain_or_any(struct check *c, int is_any, double low, double high)
 	return is_any && check_one_in(c, 5) ? check_float(c) : (float)check_real(c, low, high);
 }
 
+/* Maps of trials that have ended: making one with its guard pages takes the system longer than most trials take. */
+static struct spare {
+	uint8_t *map;
+	size_t size;
+} spare[MOST_SPARE];
+static size_t n_spare;
+
+/* Whole pages, of which nobody may touch the first and the last. */
+static uint8_t *take_map(size_t size)
+{
+	const size_t page = (size_t)sysconf(_SC_PAGESIZE);
+	uint8_t *map;
+
+	for (size_t i = n_spare; i-- > 0;)
+		if (spare[i].size == size) {
+			map = spare[i].map;
+			spare[i] = spare[--n_spare];
+			return map;
+		}
+	map = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+	assert(map != MAP_FAILED);
+	mprotect(map, page, PROT_NONE);
+	mprotect(map + size - page, page, PROT_NONE);
+	return map;
+}
+
+static void keep_map(uint8_t *map, size_t size)
+{
+	if (n_spare < MOST_SPARE && size <= MOST_SPARE_BYTES)
+		spare[n_spare++] = (struct spare){ map, size };
+	else
+		munmap(map, size);
+}
+
 static void *add_buffer(struct check *c, size_t n, size_t size, int is_output)
 {
 	const size_t page = (size_t)sysconf(_SC_PAGESIZE);
@@ -79,11 +115,8 @@ static void *add_buffer(struct check *c, size_t n, size_t size, int is_output)
 	struct check_buffer *b = &c->buffer[c->n_buffers++];
 	b->size = n * size;
 	b->map_size = (b->size + page - 1) / page * page + 2 * page;
-	b->map = mmap(NULL, b->map_size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-	assert(b->map != MAP_FAILED);
-	memset(b->map, CANARY, b->map_size);
-	mprotect(b->map, page, PROT_NONE);
-	mprotect(b->map + b->map_size - page, page, PROT_NONE);
+	b->map = take_map(b->map_size);
+	memset(b->map + page, CANARY, b->map_size - 2 * page);
 	b->data = c->trial & 1 ? b->map + page : b->map + b->map_size - page - b->size;
 	for (size_t i = 0; i < b->size; i += 8) {
 		const uint64_t bytes = check_u64(c);
@@ -108,7 +141,7 @@ void *check_out(struct check *c, size_t n, size_t size)
 static void release(struct check *c)
 {
 	for (int i = 0; i < c->n_buffers; i++) {
-		munmap(c->buffer[i].map, c->buffer[i].map_size);
+		keep_map(c->buffer[i].map, c->buffer[i].map_size);
 		free(c->buffer[i].before);
 		free(c->buffer[i].expected);
 	}
