@@ -12,6 +12,7 @@ struct warp_cube {
 	const struct warp_octants *octants;
 	const uint16_t *normal; /* of its leaves, and their offsets; NULL: none, and the cube is not mixed */
 	const uint8_t *offset;
+	const uint8_t (*color)[3]; /* NULL: gray */
 	uint64_t mask;
 	uint32_t id;
 };
@@ -50,6 +51,7 @@ static inline void warp_cube_make(struct warp_cube *out, const struct warp_insta
 	out->octants = &to->level[level - cubes->level];
 	out->normal = tree->normal != NULL ? tree->normal + leaf : NULL;
 	out->offset = tree->offset != NULL && tree->normal != NULL ? tree->offset + leaf : NULL;
+	out->color = tree->color != NULL ? (const uint8_t(*)[3])tree->color + leaf : NULL;
 	out->mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
 	out->id = slot * PSR_BLOCK_SAMPLES;
 }

@@ -1,9 +1,8 @@
-/* EWA splats: how leaves lie in the picture, and which masks are theirs. */
+/* EWA splats: what they draw. ewa_words_by() and ewa_sums_by() know the order; variants bring parts of their own. */
 #ifndef PSR_SIMD_LOOPS_EWA_H
 #define PSR_SIMD_LOOPS_EWA_H
 
-#include "base/srgb.h"
-#include "simd/cube.h"
+#include "simd/leaves_list.h"
 #include "ewa_place.h"
 
 /* ---- one splat: what is drawn of it ---- */
@@ -19,7 +18,7 @@ struct ewa_one {
 static inline void ewa_pick(struct ewa_one *one, const struct ewa_leaves *l, uint32_t i)
 {
 	const uint32_t size = (uint32_t)l->size[i], radius = ewa_size[size].radius, side = EWA_SIDE(radius);
-	const uint32_t mask = (uint32_t)(l->shape[i] * EWA_SECTORS + l->sector[i]);
+	const uint32_t mask = (uint32_t)l->mask[i];
 
 	one->x = l->x[i];
 	one->y = l->y[i];
@@ -68,18 +67,20 @@ static inline void ewa_lower(uint64_t *at, float z, float near_z, uint32_t id)
 		*at = word;
 }
 
-static inline void ewa_draw_words(const struct warp_target *t, const struct ewa_one *one)
-{
-	struct ewa_part part;
+/* Lowers the words of the pixels in a splat's core. */
+typedef void ewa_draw_words_fn(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part);
+/* Adds a splat of this value to its pixels, but to those whose own word is nearer by more than is one surface. */
+typedef void ewa_draw_sums_fn(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part,
+                              float same, const uint32_t value[EWA_LANES]);
 
-	if (!ewa_clip(&part, t, one->x, one->y, one->radius))
-		return;
-	for (int32_t y = part.y0; y < part.y1; y++) {
+static inline void ewa_draw_words(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part)
+{
+	for (int32_t y = part->y0; y < part->y1; y++) {
 		const int32_t dy = y - one->y;
 		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + one->radius - one->x;
 		uint64_t *row = t->word + (size_t)(y - t->y0) * t->stride - t->x0;
 
-		for (int32_t x = part.x0; x < part.x1; x++)
+		for (int32_t x = part->x0; x < part->x1; x++)
 			if (weight[x] >= one->core)
 				ewa_lower(&row[x], ewa_depth(one, (float)(x - one->x), (float)dy), t->near_z, one->id);
 	}
@@ -89,27 +90,26 @@ static inline void ewa_draw_words(const struct warp_target *t, const struct ewa_
 static inline void ewa_add(struct ewa_sum *to, uint64_t word, float z, const uint32_t value[EWA_LANES], uint32_t weight)
 {
 	const int is_same = z <= psr_float_from_bits((uint32_t)(word >> 32));
-	const uint32_t w = weight & (0u - (uint32_t)(is_same & (to->lane[EWA_WEIGHT] < EWA_MOST_WEIGHT)));
+	const uint32_t w = weight & (0u - (uint32_t)is_same);
 
 	for (int k = 0; k < EWA_LANES; k++)
 		to->lane[k] += w * value[k];
 }
 
-static inline void ewa_draw_sums(const struct warp_target *t, const struct ewa_one *one, float same,
-                                 const uint32_t value[EWA_LANES])
+static inline void ewa_draw_sums(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part,
+                                 float same, const uint32_t value[EWA_LANES])
 {
-	struct ewa_part part;
+	uint32_t own[EWA_LANES];
 
-	if (!ewa_clip(&part, t, one->x, one->y, one->radius))
-		return;
-	for (int32_t y = part.y0; y < part.y1; y++) {
+	memcpy(own, value, sizeof own);
+	for (int32_t y = part->y0; y < part->y1; y++) {
 		const int32_t dy = y - one->y;
 		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + one->radius - one->x;
 		const uint64_t *row = t->word + (size_t)(y - t->y0) * t->stride - t->x0;
 		struct ewa_sum *sum = t->sum + (size_t)(y - t->y0) * t->sum_stride - t->x0;
 
-		for (int32_t x = part.x0; x < part.x1; x++)
-			ewa_add(&sum[x], row[x], ewa_depth(one, (float)(x - one->x), (float)dy) - same, value, weight[x]);
+		for (int32_t x = part->x0; x < part->x1; x++)
+			ewa_add(&sum[x], row[x], ewa_depth(one, (float)(x - one->x), (float)dy) - same, own, weight[x]);
 	}
 }
 
@@ -188,64 +188,175 @@ static inline void ewa_draw_wide(const struct warp_target *t, const struct ewa_l
 
 /* ---- kernels ---- */
 
-static uint64_t ewa_words(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+struct ewa_parts {
+	ewa_list_fn *list;
+	ewa_draw_words_fn *draw_words;
+	ewa_draw_sums_fn *draw_sums;
+};
+
+/* Fetches what a cube's leaves need, as make_cubes() of leaves_list.h. */
+static inline void ewa_make_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
+                                  uint32_t n)
 {
+	for (uint32_t i = 0; i < n; i++) {
+		struct warp_cube *c = &cubes[i];
+
+		warp_cube_make(c, &t->instance[entry[i].instance], entry[i].slot);
+		if (c->normal != NULL)
+			__builtin_prefetch(c->normal);
+		if (c->offset != NULL)
+			__builtin_prefetch(c->offset);
+	}
+}
+
+/* The cubes of a run of entries on their way to a batch. */
+struct ewa_reader {
+	const struct warp_target *t;
+	const struct bin_entry *entry;
+	uint32_t n, at; /* entries, and the next one */
+	struct warp_cube cubes[BLOCKS];
+};
+
+/* Fills a batch with the leaves of the next cubes, as many as there is room for. Returns 0 at the end. */
+static inline __attribute__((always_inline)) int ewa_fill(struct ewa_leaves *l, struct ewa_reader *r, ewa_list_fn *list,
+                                                          int with_looks)
+{
+	const struct warp_target *t = r->t;
+
+	l->n = 0;
+	for (; r->at < r->n; r->at++) {
+		const uint32_t e = r->at;
+		const struct warp_instance *in = &t->instance[r->entry[e].instance];
+		const struct warp_cube *cube = &r->cubes[e % BLOCKS];
+
+		if (e % BLOCKS == 0) {
+			fetch_cubes(t, r->entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, r->n));
+			fetch_codes(t, r->entry + e + BLOCKS, batch_of(e + BLOCKS, r->n));
+			ewa_make_cubes(r->cubes, t, r->entry + e, batch_of(e, r->n));
+		}
+		const uint32_t n = (uint32_t)__builtin_popcountll(cube->mask);
+		if (l->n > 0 && (l->n + n > EWA_BATCH || in != l->in))
+			return 1;
+		l->in = in;
+		list(l, t, &r->entry[e], cube);
+		if (with_looks)
+			ewa_read_colors(l, cube, n);
+	}
+	return l->n > 0;
+}
+
+static inline __attribute__((always_inline)) uint64_t ewa_words_by(struct ewa_parts parts, const struct warp_target *t,
+                                                                   const struct bin_entry *entry, uint32_t n)
+{
+	struct ewa_reader reader = { .t = t, .entry = entry, .n = n };
 	struct ewa_leaves l;
+	struct words words;
 	struct ewa_one one;
+	struct ewa_part part;
 	uint64_t n_inside = 0;
 
-	for (uint32_t e = 0; e < n; e++) {
-		ewa_place(&l, t, &entry[e]);
+	words.n = 0;
+	while (ewa_fill(&l, &reader, parts.list, 0)) {
+		uint32_t others[EWA_ROOM], n_others = 0;
+
+		ewa_place(&l, t);
+		if (words.n > LIST - EWA_BATCH)
+			lower_words(t->word, &words);
 		for (uint32_t i = 0; i < l.n; i++) {
-			if (!l.is_left[i])
-				continue;
+			const uint32_t is_one = l.pixel[i] != UINT32_MAX;
+
+			words.word[words.n] = (uint64_t)psr_bits_from_float(l.pixel_z[i]) << 32 | l.id[i];
+			words.at[words.n] = l.pixel[i];
+			n_inside += is_one;
+			words.n += is_one & (l.pixel_z[i] > t->near_z);
+			others[n_others] = i;
+			n_others += (uint32_t)(l.is_left[i] & (l.size[i] > 0));
+		}
+		for (uint32_t k = 0; k < n_others; k++) {
+			const uint32_t i = others[k];
+
 			n_inside += (uint64_t)((l.x[i] >= t->x0) & (l.x[i] < t->x1) & (l.y[i] >= t->y0) & (l.y[i] < t->y1));
 			if (l.size[i] == EWA_SIZES) {
 				ewa_draw_wide(t, &l, i, 0, NULL);
 				continue;
 			}
 			ewa_pick(&one, &l, i);
-			ewa_draw_words(t, &one);
+			if (ewa_clip(&part, t, one.x, one.y, one.radius))
+				parts.draw_words(t, &one, &part);
 		}
 	}
+	lower_words(t->word, &words);
 	return n_inside;
 }
 
-static void ewa_values(uint32_t value[EWA_LANES], const struct ewa_leaves *l, uint32_t i)
+/* Adds splats of one pixel each. */
+struct ewa_ones {
+	uint32_t n, sum[EWA_ROOM], weight[EWA_ROOM], leaf[EWA_ROOM];
+};
+
+static inline void ewa_add_one(const struct warp_target *t, const struct ewa_ones *ones, const struct ewa_leaves *l,
+                               uint32_t i)
 {
-	value[EWA_WEIGHT] = 1;
-	for (int k = 0; k < 3; k++) {
-		value[EWA_NORMAL + k] = (uint32_t)l->turned[k][i];
-		value[EWA_COLOR + k] = (uint32_t)l->color[k][i];
-	}
-	value[EWA_LANES - 1] = 0;
+	uint32_t *to = t->sum[ones->sum[i]].lane;
+	const uint32_t *value = l->value[ones->leaf[i]], w = ones->weight[i];
+
+	for (int k = 0; k < EWA_LANES; k++)
+		to[k] += w * value[k];
 }
 
-static uint64_t ewa_sums(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+static inline __attribute__((always_inline)) uint64_t ewa_sums_by(struct ewa_parts parts, const struct warp_target *t,
+                                                                  const struct bin_entry *entry, uint32_t n)
 {
+	struct ewa_reader reader = { .t = t, .entry = entry, .n = n };
 	struct ewa_leaves l;
+	struct ewa_ones ones;
 	struct ewa_one one;
-	uint64_t n_inside = 0;
+	struct ewa_part part;
+	uint64_t n_given = 0;
 
-	for (uint32_t e = 0; e < n; e++) {
-		ewa_place(&l, t, &entry[e]);
-		ewa_look(&l, t, &entry[e]);
+	while (ewa_fill(&l, &reader, parts.list, 1)) {
+		uint32_t others[EWA_ROOM], n_others = 0;
+
+		ewa_place(&l, t);
+		ewa_turn(&l);
+		ones.n = 0;
 		for (uint32_t i = 0; i < l.n; i++) {
-			_Alignas(32) uint32_t value[EWA_LANES];
+			const uint32_t is_one = l.pixel[i] != UINT32_MAX, pixel = is_one ? l.pixel[i] : 0;
+			const float own = psr_float_from_bits((uint32_t)(t->word[pixel] >> 32));
 
-			if (!l.is_left[i])
-				continue;
-			n_inside++;
-			ewa_values(value, &l, i);
+			ones.sum[ones.n] = (uint32_t)(l.y[i] - t->y0) * t->sum_stride + (uint32_t)(l.x[i] - t->x0);
+			ones.weight[ones.n] = ewa_weight[l.mask[i]];
+			ones.leaf[ones.n] = i;
+			ones.n += is_one & (l.pixel_z[i] - l.same[i] <= own);
+			others[n_others] = i;
+			n_others += (uint32_t)(l.is_left[i] & (l.size[i] > 0));
+			n_given += (uint32_t)l.is_left[i];
+		}
+		for (uint32_t i = 0; i < ones.n; i++)
+			ewa_add_one(t, &ones, &l, i);
+		for (uint32_t k = 0; k < n_others; k++) {
+			const uint32_t i = others[k];
+
 			if (l.size[i] == EWA_SIZES) {
-				ewa_draw_wide(t, &l, i, l.same, value);
+				ewa_draw_wide(t, &l, i, l.same[i], l.value[i]);
 				continue;
 			}
 			ewa_pick(&one, &l, i);
-			ewa_draw_sums(t, &one, l.same, value);
+			if (ewa_clip(&part, t, one.x, one.y, one.radius))
+				parts.draw_sums(t, &one, &part, l.same[i], l.value[i]);
 		}
 	}
-	return n_inside;
+	return n_given;
+}
+
+static inline uint64_t ewa_words(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	return ewa_words_by((struct ewa_parts){ ewa_list, ewa_draw_words, ewa_draw_sums }, t, entry, n);
+}
+
+static inline uint64_t ewa_sums(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	return ewa_sums_by((struct ewa_parts){ ewa_list, ewa_draw_words, ewa_draw_sums }, t, entry, n);
 }
 
 #endif

@@ -1,4 +1,5 @@
-/* EWA splats: the leaves of a cube in the picture. */
+/* EWA splats: batches of leaves in the picture. Each step is a loop over a batch, which the compiler turns into vectors;
+ * a batch is of one instance, and cubes fill it whatever their levels. */
 #ifndef PSR_SIMD_LOOPS_EWA_PLACE_H
 #define PSR_SIMD_LOOPS_EWA_PLACE_H
 
@@ -11,22 +12,36 @@
  * not follow from its middle. */
 #define EWA_STEEP 1.0f
 
+#define EWA_BATCH 128  /* leaves; what a batch needs stays in L1 */
+#define EWA_VECTOR 16  /* lanes of the widest vector: steps go on to a multiple, listing may write so many beyond the end */
+#define EWA_ROOM (EWA_BATCH + EWA_VECTOR)
+
+enum ewa_kind { EWA_MIXED = 1, EWA_TURNS = 2 }; /* may face away; is seen from both sides */
+
 struct ewa_leaves {
 	uint32_t n;
-	float same; /* EWA_SAME edges, along the view axis */
-	struct warp_cube cube;
-	uint8_t lane[PSR_BLOCK_SAMPLES];
-	uint32_t id[PSR_BLOCK_SAMPLES];
-	int32_t is_left[PSR_BLOCK_SAMPLES]; /* 1: may be drawn */
-	float u[PSR_BLOCK_SAMPLES], v[PSR_BLOCK_SAMPLES];
-	int32_t x[PSR_BLOCK_SAMPLES], y[PSR_BLOCK_SAMPLES]; /* the pixel of its middle */
-	float z[PSR_BLOCK_SAMPLES], zx[PSR_BLOCK_SAMPLES], zy[PSR_BLOCK_SAMPLES], least[PSR_BLOCK_SAMPLES]; /* as of ewa_one */
-	float normal[3][PSR_BLOCK_SAMPLES];                 /* 511 times as long; 0 without */
-	float facing[PSR_BLOCK_SAMPLES];                    /* below 0: faces the eye */
-	float across[PSR_BLOCK_SAMPLES], aslant[PSR_BLOCK_SAMPLES], down[PSR_BLOCK_SAMPLES]; /* squares of an edge in it */
-	int32_t size[PSR_BLOCK_SAMPLES], shape[PSR_BLOCK_SAMPLES], sector[PSR_BLOCK_SAMPLES];
-	int32_t is_flipped[PSR_BLOCK_SAMPLES];              /* the mask, up and down */
-	int32_t turned[3][PSR_BLOCK_SAMPLES], color[3][PSR_BLOCK_SAMPLES]; /* as of ewa_sum */
+	const struct warp_instance *in;
+	/* Listed: places as those of warp_cubes.origin, normals 511 times as long or 0, the edge as drawn, inner units. */
+	_Alignas(64) float at[3][EWA_ROOM];
+	float normal[3][EWA_ROOM], edge[EWA_ROOM];
+	uint32_t id[EWA_ROOM];
+	int32_t kind[EWA_ROOM];
+	/* Placed. */
+	int32_t is_left[EWA_ROOM]; /* 1: may be drawn */
+	float u[EWA_ROOM], v[EWA_ROOM];
+	int32_t x[EWA_ROOM], y[EWA_ROOM]; /* the pixel of its middle */
+	float z[EWA_ROOM], zx[EWA_ROOM], zy[EWA_ROOM], least[EWA_ROOM]; /* as of ewa_one */
+	float same[EWA_ROOM];   /* EWA_SAME edges, along the view axis */
+	float facing[EWA_ROOM]; /* below 0: faces the eye */
+	float across[EWA_ROOM], aslant[EWA_ROOM], down[EWA_ROOM]; /* squares of an edge in it */
+	int32_t size[EWA_ROOM];
+	int32_t mask[EWA_ROOM]; /* shape and sector: of the masks of its size */
+	int32_t is_flipped[EWA_ROOM]; /* the mask, up and down */
+	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile; its z', and 0 unless beyond
+	 * near_z. */
+	uint32_t pixel[EWA_ROOM];
+	float pixel_z[EWA_ROOM];
+	uint32_t value[EWA_ROOM][EWA_LANES]; /* as of ewa_sum, of weight 1 */
 };
 
 static inline float ewa_dot(const float m[3], float x, float y, float z)
@@ -34,71 +49,104 @@ static inline float ewa_dot(const float m[3], float x, float y, float z)
 	return (m[0] * x + m[1] * y) + m[2] * z;
 }
 
-/* Lists the leaves of a cube, with their normals. */
-static inline void ewa_list(struct ewa_leaves *l, const struct warp_target *t, const struct warp_cube *cube)
+/* Lanes that a step covers. */
+static inline uint32_t ewa_lanes(const struct ewa_leaves *l)
 {
-	uint32_t n = 0;
-
-	for (uint64_t left = cube->mask; left; left &= left - 1, n++) {
-		l->lane[n] = (uint8_t)__builtin_ctzll(left);
-		l->id[n] = cube->id + l->lane[n];
-	}
-	l->n = n;
-	for (uint32_t i = 0; i < n; i++) {
-		float normal[3] = { 0, 0, 0 };
-
-		if (cube->normal != NULL)
-			warp_normal(normal, t->direction[cube->normal[i]]);
-		for (int k = 0; k < 3; k++)
-			l->normal[k][i] = normal[k];
-	}
+	return (l->n + EWA_VECTOR - 1) / EWA_VECTOR * EWA_VECTOR;
 }
 
-/* Finds u, v and z', and which leaves may be drawn. */
-static inline void ewa_project(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry)
+/* Lists a cube's leaves; the batch has room. */
+typedef void ewa_list_fn(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry,
+                         const struct warp_cube *cube);
+
+/* What all leaves of a cube have in common. */
+static inline int32_t ewa_kind_of(const struct warp_target *t, const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &t->instance[entry->instance];
-	const struct warp_octants *octants = l->cube.octants;
-	const int perspective = t->perspective, is_mixed = entry->is_mixed;
-	const float far = 2.0f * PSR_MAX_SIDE, near_z = t->near_z;
-	float row[3][8], offset[PSR_BLOCK_SAMPLES] = { 0 };
+	const int turns = (in->blocks->flags[entry->slot - in->first_slot] & PSR_BLOCK_TWO_SIDED) != 0;
+
+	return (entry->is_mixed ? EWA_MIXED : 0) | (turns ? EWA_TURNS : 0);
+}
+
+static inline float ewa_edge_of(const struct warp_target *t, const struct bin_entry *entry)
+{
+	const struct warp_instance *in = &t->instance[entry->instance];
+	const unsigned width = psr_blocks_level(in->blocks, entry->slot - in->first_slot);
+
+	return (float)(in->cubes->model->level[0].edge * (double)(1u << width));
+}
+
+static inline void ewa_list(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry,
+                            const struct warp_cube *cube)
+{
+	const struct warp_octants *octants = cube->octants;
+	const float edge = ewa_edge_of(t, entry);
+	const int32_t kind = ewa_kind_of(t, entry);
+	float row[3][8];
+	uint32_t n = 0;
 
 	for (int a = 0; a < 3; a++)
 		for (int i = 0; i < 8; i++)
-			row[a][i] = (float)(l->cube.origin[a] + octants->row[a][i]);
-	for (uint32_t i = 0; l->cube.offset != NULL && i < l->n; i++)
-		offset[i] = (float)(2 * l->cube.offset[i] - WARP_OFFSET_MIDDLE);
-	for (uint32_t i = 0; i < l->n; i++) {
-		const uint32_t lane = l->lane[i];
-		const float nx = l->normal[0][i], ny = l->normal[1][i], nz = l->normal[2][i];
-		float at[3];
+			row[a][i] = (float)(cube->origin[a] + octants->row[a][i]);
+	for (uint64_t left = cube->mask; left; left &= left - 1, n++) {
+		const uint32_t lane = (uint32_t)__builtin_ctzll(left), i = l->n + n;
+		float normal[3] = { 0, 0, 0 };
 
-		for (int a = 0; a < 3; a++)
-			at[a] = (row[a][lane >> 3] + octants->col[a][lane & 7]) + ewa_dot(octants->along[a], nx, ny, nz) * offset[i];
-		const float inverse = psr_choose(perspective, 1 / at[2], 1);
-		const float u = at[0] * inverse, v = at[1] * inverse;
+		if (cube->normal != NULL)
+			warp_normal(normal, t->direction[cube->normal[n]]);
+		const float offset = cube->offset != NULL ? (float)(2 * cube->offset[n] - WARP_OFFSET_MIDDLE) : 0;
+		for (int a = 0; a < 3; a++) {
+			l->at[a][i] = (row[a][lane >> 3] + octants->col[a][lane & 7])
+			              + ewa_dot(octants->along[a], normal[0], normal[1], normal[2]) * offset;
+			l->normal[a][i] = normal[a];
+		}
+		l->edge[i] = edge;
+		l->id[i] = cube->id + lane;
+		l->kind[i] = kind;
+	}
+	l->n += n;
+}
+
+/* Finds u, v and z', and which leaves may be drawn. */
+static inline void ewa_project(struct ewa_leaves *l, const struct warp_target *t)
+{
+	const struct warp_instance *in = l->in;
+	const int perspective = t->perspective;
+	const float far = 2.0f * PSR_MAX_SIDE, near_z = t->near_z;
+	const uint32_t n = ewa_lanes(l);
+
+	for (uint32_t i = 0; i < n; i++) {
+		const float nx = l->normal[0][i], ny = l->normal[1][i], nz = l->normal[2][i], z = l->at[2][i];
+		const float inverse = psr_choose(perspective, 1 / z, 1);
+		const float u = l->at[0][i] * inverse, v = l->at[1][i] * inverse;
 		const float dx = (u * in->du[0] + v * in->dv[0]) + in->d0[0], dy = (u * in->du[1] + v * in->dv[1]) + in->d0[1];
 		const float dz = (u * in->du[2] + v * in->dv[2]) + in->d0[2];
 		const float g = (nx * dx + ny * dy) + nz * dz, length2 = (dx * dx + dy * dy) + dz * dz;
-		const int is_away = (g > 0) & (g * g > (BACK_SINE * BACK_SINE * 511 * 511) * length2) & is_mixed;
+		const int is_away = (g > 0) & (g * g > (BACK_SINE * BACK_SINE * 511 * 511) * length2) & l->kind[i];
+		const int is_left = (z > near_z) & (u > -far) & (u < far) & (v > -far) & (v < far) & !is_away & (i < l->n);
 
-		l->is_left[i] = (at[2] > near_z) & (u > -far) & (u < far) & (v > -far) & (v < far) & !is_away;
-		l->u[i] = psr_where(l->is_left[i], u);
-		l->v[i] = psr_where(l->is_left[i], v);
-		l->z[i] = at[2];
+		l->is_left[i] = is_left;
+		l->u[i] = psr_where(is_left, u);
+		l->v[i] = psr_where(is_left, v);
 		l->facing[i] = g;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		l->x[i] = psr_floor_int(l->u[i]);
+		l->y[i] = psr_floor_int(l->v[i]);
 	}
 }
 
 /* Finds the edge's ellipses: of a disc that has an edge as its radius. */
-static inline void ewa_shape(struct ewa_leaves *l, const struct ewa_view *view, float edge, int perspective)
+static inline void ewa_shape(struct ewa_leaves *l, int perspective)
 {
+	const struct ewa_view *view = &l->in->cubes->ewa;
 	const float xx = view->square[0][0], yy = view->square[1][1], zz = view->square[2][2];
 	const float xy = view->square[0][1], xz = view->square[0][2], yz = view->square[1][2];
+	const uint32_t n = ewa_lanes(l);
 
-	for (uint32_t i = 0; i < l->n; i++) {
-		const float u = psr_where(perspective, l->u[i]), v = psr_where(perspective, l->v[i]);
-		const float scale = psr_choose(perspective, edge / l->z[i], edge), square = scale * scale;
+	for (uint32_t i = 0; i < n; i++) {
+		const float u = psr_where(perspective, l->u[i]), v = psr_where(perspective, l->v[i]), edge = l->edge[i];
+		const float scale = psr_choose(perspective, edge / l->at[2][i], edge), square = scale * scale;
 		const float nx = l->normal[0][i] * (1 / 511.0f), ny = l->normal[1][i] * (1 / 511.0f);
 		const float nz = l->normal[2][i] * (1 / 511.0f), along = ewa_dot(view->axis[2], nx, ny, nz);
 		const float p = ewa_dot(view->axis[0], nx, ny, nz) - u * along, q = ewa_dot(view->axis[1], nx, ny, nz) - v * along;
@@ -120,7 +168,9 @@ static inline int32_t ewa_cell(float at)
 /* Finds sizes, shapes and sectors. */
 static inline void ewa_quantise(struct ewa_leaves *l)
 {
-	for (uint32_t i = 0; i < l->n; i++) {
+	const uint32_t n = ewa_lanes(l);
+
+	for (uint32_t i = 0; i < n; i++) {
 		const float across = l->across[i], down = l->down[i], aslant = l->aslant[i], half = 0.5f * (across - down);
 		const float wide = 0.5f * (across + down) + __builtin_sqrtf(half * half + aslant * aslant);
 		const float inverse = 1 / psr_choose(wide > 1e-30f, wide, 1e-30f);
@@ -129,29 +179,28 @@ static inline void ewa_quantise(struct ewa_leaves *l)
 		const float z2 = (1 - x * x) - y * y, z = __builtin_sqrtf(psr_where(z2 > 0, z2)), unit = 8 / ((x + y) + z);
 		const float column = x * unit, row = y * unit;
 		const int32_t c = ewa_cell(column), r = ewa_cell(row);
-		const int is_upper = (column - (float)c) + (row - (float)r) > 1;
-		const int32_t pixel_u = psr_floor_int(l->u[i]), pixel_v = psr_floor_int(l->v[i]);
-		const int is_flipped = aslant > 0;
+		const int32_t is_upper = (column - (float)c) + (row - (float)r) > 1, turn = -is_upper & 7;
+		const int32_t is_flipped = aslant > 0, is_right = l->u[i] - (float)l->x[i] >= 0.5f;
+		const int32_t is_low = (l->v[i] - (float)l->y[i] >= 0.5f) ^ is_flipped;
 		int32_t size = 0;
 
 		for (int k = 0; k < EWA_SIZES; k++)
 			size += wide > ewa_size[k].edge * ewa_size[k].edge;
 		l->size[i] = size;
-		l->shape[i] = 8 * (is_upper ? 7 - r : r) + (is_upper ? 7 - c : c);
-		l->sector[i] = (l->u[i] - (float)pixel_u >= 0.5f) | ((l->v[i] - (float)pixel_v >= 0.5f) ^ is_flipped) << 1;
+		l->mask[i] = (8 * (r ^ turn) + (c ^ turn)) * EWA_SECTORS + (is_right | is_low << 1);
 		l->is_flipped[i] = is_flipped;
-		l->x[i] = pixel_u;
-		l->y[i] = pixel_v;
 	}
 }
 
 /* Finds how depth changes over a splat's plane. */
-static inline void ewa_slope(struct ewa_leaves *l, const struct ewa_view *view, float depth, int perspective)
+static inline void ewa_slope(struct ewa_leaves *l, int perspective)
 {
-	const float steep = EWA_STEEP * depth, nearer = (float)(CUBES_DIAGONAL / 2) * depth;
+	const struct ewa_view *view = &l->in->cubes->ewa;
+	const uint32_t n = ewa_lanes(l);
 
-	for (uint32_t i = 0; i < l->n; i++) {
-		const float nx = l->normal[0][i], ny = l->normal[1][i], nz = l->normal[2][i], z = l->z[i];
+	for (uint32_t i = 0; i < n; i++) {
+		const float nx = l->normal[0][i], ny = l->normal[1][i], nz = l->normal[2][i], z = l->at[2][i];
+		const float depth = l->edge[i] * view->depth, steep = EWA_STEEP * depth;
 		const float a = ewa_dot(view->dual[0], nx, ny, nz), b = ewa_dot(view->dual[1], nx, ny, nz);
 		const float c = ewa_dot(view->dual[2], nx, ny, nz);
 		const float through = psr_choose(perspective, (a * l->u[i] + b * l->v[i]) + c, c);
@@ -165,27 +214,38 @@ static inline void ewa_slope(struct ewa_leaves *l, const struct ewa_view *view, 
 
 		l->zx[i] = zx;
 		l->zy[i] = zy;
-		l->least[i] = z - nearer;
+		l->least[i] = z - (float)(CUBES_DIAGONAL / 2) * depth;
 		l->z[i] = z + (dx * zx + dy * zy);
+		l->same[i] = EWA_SAME * l->edge[i] * view->depth;
 	}
 }
 
-/* Finds all that a cube's splats need but their looks. */
-static inline void ewa_place(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry)
+/* Finds the pixels of splats of size 0, which have one each. */
+static inline void ewa_find_pixels(struct ewa_leaves *l, const struct warp_target *t)
 {
-	const struct warp_instance *in = &t->instance[entry->instance];
-	const struct psr_cubes *cubes = in->cubes->model;
-	const struct ewa_view *view = &in->cubes->ewa;
+	const uint32_t w = (uint32_t)(t->x1 - t->x0), h = (uint32_t)(t->y1 - t->y0), n = ewa_lanes(l), stride = t->stride;
+	const int32_t x0 = t->x0, y0 = t->y0;
 
-	warp_cube_make(&l->cube, in, entry->slot);
-	const unsigned width = psr_blocks_level(&cubes->groups, entry->slot - in->first_slot);
-	const float edge = (float)(cubes->level[0].edge * (double)(1u << width));
-	l->same = EWA_SAME * edge * view->depth;
-	ewa_list(l, t, &l->cube);
-	ewa_project(l, t, entry);
-	ewa_shape(l, view, edge, t->perspective);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t x = (uint32_t)(l->x[i] - x0), y = (uint32_t)(l->y[i] - y0);
+		const int is_drawn = l->is_left[i] & (l->size[i] == 0) & (x < w) & (y < h);
+		const float z = psr_choose(l->z[i] > l->least[i], l->z[i], l->least[i]);
+
+		l->pixel[i] = (y * stride + x) | (0u - (uint32_t)!is_drawn);
+		l->pixel_z[i] = z;
+	}
+}
+
+/* Finds all that a batch's splats need but their looks. */
+static inline void ewa_place(struct ewa_leaves *l, const struct warp_target *t)
+{
+	for (uint32_t i = l->n; i < ewa_lanes(l); i++)
+		l->at[2][i] = 0;
+	ewa_project(l, t);
+	ewa_shape(l, t->perspective);
 	ewa_quantise(l);
-	ewa_slope(l, view, edge * view->depth, t->perspective);
+	ewa_slope(l, t->perspective);
+	ewa_find_pixels(l, t);
 }
 
 static inline int32_t ewa_round(float x)
@@ -193,31 +253,31 @@ static inline int32_t ewa_round(float x)
 	return psr_floor_int(x + 0.5f);
 }
 
-/* Finds normals in camera space and colours. */
-static inline void ewa_look(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry)
+/* Reads the colours of the n leaves that a cube has added to the batch. */
+static inline void ewa_read_colors(struct ewa_leaves *l, const struct warp_cube *cube, uint32_t n)
 {
-	const struct warp_instance *in = &t->instance[entry->instance];
-	const struct psr_cubes *cubes = in->cubes->model;
-	const uint32_t cube = entry->slot - in->first_slot;
-	const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
-	const uint8_t(*color)[3] = (const uint8_t(*)[3])level->tree->color;
-	const int turns = (cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED) != 0;
+	for (uint32_t i = l->n - n, j = 0; i < l->n; i++, j++)
+		for (int k = 0; k < 3; k++) {
+			const uint32_t code = cube->color != NULL ? cube->color[j][k] : (uint32_t)(CUBES_GRAY >> 8 * k & 0xff);
 
-	color += color != NULL ? psr_cubes_leaf(cubes, level, cube) : 0;
+			l->value[i][EWA_COLOR + k] = (uint32_t)(int32_t)(psr_srgb_to_linear[code] * EWA_COLOR_ONE + 0.5f);
+		}
+}
+
+/* Finds normals in camera space. */
+static inline void ewa_turn(struct ewa_leaves *l)
+{
+	const float(*turn)[3] = l->in->turn;
 
 	for (uint32_t i = 0; i < l->n; i++) {
-		const float side = psr_choose(turns & (l->facing[i] > 0), -1, 1);
+		const float side = psr_choose(((l->kind[i] & EWA_TURNS) != 0) & (l->facing[i] > 0), -1, 1);
 		const float nx = side * l->normal[0][i], ny = side * l->normal[1][i], nz = side * l->normal[2][i];
 
+		l->value[i][EWA_WEIGHT] = 1;
 		for (int k = 0; k < 3; k++)
-			l->turned[k][i] = ewa_round(ewa_dot(in->turn[k], nx, ny, nz));
+			l->value[i][EWA_NORMAL + k] = (uint32_t)ewa_round(ewa_dot(turn[k], nx, ny, nz));
+		l->value[i][EWA_LANES - 1] = 0;
 	}
-	for (uint32_t i = 0; i < l->n; i++)
-		for (int k = 0; k < 3; k++) {
-			const uint32_t code = color != NULL ? color[i][k] : (uint32_t)(CUBES_GRAY >> 8 * k & 0xff);
-
-			l->color[k][i] = (int32_t)(psr_srgb_to_linear[code] * EWA_COLOR_ONE + 0.5f);
-		}
 }
 
 #endif
