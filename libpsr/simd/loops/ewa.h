@@ -349,14 +349,4 @@ static inline __attribute__((always_inline)) uint64_t ewa_sums_by(struct ewa_par
 	return n_given;
 }
 
-static inline uint64_t ewa_words(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
-{
-	return ewa_words_by((struct ewa_parts){ ewa_list, ewa_draw_words, ewa_draw_sums }, t, entry, n);
-}
-
-static inline uint64_t ewa_sums(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
-{
-	return ewa_sums_by((struct ewa_parts){ ewa_list, ewa_draw_words, ewa_draw_sums }, t, entry, n);
-}
-
 #endif

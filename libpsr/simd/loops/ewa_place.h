@@ -114,21 +114,29 @@ static inline void ewa_project(struct ewa_leaves *l, const struct warp_target *t
 	const int perspective = t->perspective;
 	const float far = 2.0f * PSR_MAX_SIDE, near_z = t->near_z;
 	const uint32_t n = ewa_lanes(l);
+	float du[3], dv[3], d0[3];
 
+	memcpy(du, in->du, sizeof du);
+	memcpy(dv, in->dv, sizeof dv);
+	memcpy(d0, in->d0, sizeof d0);
 	for (uint32_t i = 0; i < n; i++) {
 		const float nx = l->normal[0][i], ny = l->normal[1][i], nz = l->normal[2][i], z = l->at[2][i];
 		const float inverse = psr_choose(perspective, 1 / z, 1);
 		const float u = l->at[0][i] * inverse, v = l->at[1][i] * inverse;
-		const float dx = (u * in->du[0] + v * in->dv[0]) + in->d0[0], dy = (u * in->du[1] + v * in->dv[1]) + in->d0[1];
-		const float dz = (u * in->du[2] + v * in->dv[2]) + in->d0[2];
+		const float dx = (u * du[0] + v * dv[0]) + d0[0], dy = (u * du[1] + v * dv[1]) + d0[1];
+		const float dz = (u * du[2] + v * dv[2]) + d0[2];
 		const float g = (nx * dx + ny * dy) + nz * dz, length2 = (dx * dx + dy * dy) + dz * dz;
-		const int is_away = (g > 0) & (g * g > (BACK_SINE * BACK_SINE * 511 * 511) * length2) & l->kind[i];
-		const int is_left = (z > near_z) & (u > -far) & (u < far) & (v > -far) & (v < far) & !is_away & (i < l->n);
+		const float limit = (BACK_SINE * BACK_SINE * 511 * 511) * length2;
+		const int32_t is_away = (g > 0) & (g * g > limit), is_near = (u > -far) & (u < far) & (v > -far) & (v < far);
 
-		l->is_left[i] = is_left;
-		l->u[i] = psr_where(is_left, u);
-		l->v[i] = psr_where(is_left, v);
+		l->is_left[i] = (z > near_z) & is_near & ~(is_away & l->kind[i]);
+		l->u[i] = u;
+		l->v[i] = v;
 		l->facing[i] = g;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		l->u[i] = psr_where(l->is_left[i], l->u[i]);
+		l->v[i] = psr_where(l->is_left[i], l->v[i]);
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		l->x[i] = psr_floor_int(l->u[i]);

@@ -1,8 +1,7 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
- * instructions. Arguments: the kernels of warp, leaves, veil and reproject_look, and a macro that names a kernel's variant where one is
- * written by hand. */
+ * instructions. Arguments: the name of the set, the kernel of reproject_look, and a macro that names a kernel's variant
+ * where one is written by hand. */
 #include "cull.h"
-#include "ewa.h"
 #include "fill_pull.h"
 #include "fill_push.h"
 #include "gaps.h"
@@ -16,17 +15,17 @@
 #include "strip.h"
 #include "zbuffer.h"
 
-#define SIMD_TABLE(warp_kernel, leaves_kernel, veil_kernel, look_kernel, KERNEL) { \
+#define SIMD_TABLE(isa, look_kernel, KERNEL) { \
 	.cull = cull,                                  \
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
 	.warp_cells = warp_cells,                      \
-	.warp = warp_kernel,                           \
-	.warp_leaves = leaves_kernel,                  \
+	.warp = warp_##isa,                           \
+	.warp_leaves = warp_leaves_##isa,              \
 	.warp_points = warp_points,                    \
-	.ewa_words = ewa_words,                        \
-	.ewa_sums = ewa_sums,                          \
-	.veil = veil_kernel,                           \
+	.ewa_words = ewa_words_##isa,                  \
+	.ewa_sums = ewa_sums_##isa,                    \
+	.veil = veil_##isa,                            \
 	.strip_list = KERNEL(strip_list),              \
 	.strip_find = strip_find,                      \
 	.strip_read = KERNEL(strip_read),              \
