@@ -5,11 +5,24 @@
 #include "sheer.h"
 
 #define RUN 64 /* cubes added up between two questions */
+/* Cubes that can add less to a pixel's weight than what is left from EWA_MOST_WEIGHT on. */
+#define MOST_UNHELD ((UINT32_MAX - EWA_MOST_WEIGHT) / (255 * PSR_BLOCK_SAMPLES) - RUN)
 
 static void clear_sums(const struct warp_target *t)
 {
 	for (int32_t y = t->y0; y < t->y1; y++)
 		memset(t->sum + (size_t)(y - t->y0) * t->sum_stride, 0, (size_t)(t->x1 - t->x0) * sizeof *t->sum);
+}
+
+/* Keeps weights from growing beyond what they hold. */
+static void hold_weights(const struct warp_target *t)
+{
+	for (int32_t y = 0; y < t->y1 - t->y0; y++)
+		for (int32_t x = 0; x < t->x1 - t->x0; x++) {
+			uint32_t *weight = &t->sum[(size_t)y * t->sum_stride + (size_t)x].lane[EWA_WEIGHT];
+
+			*weight = *weight < EWA_MOST_WEIGHT ? *weight : EWA_MOST_WEIGHT;
+		}
 }
 
 /* Whether all pixels that a cube's splats reach are nearer by more than is one surface. */
@@ -47,7 +60,7 @@ void ewa_tile(const struct simd *simd, const struct plan *plan, const struct bin
 	const int skips = (plan->cull_tests & PSR_CULL_OCCLUSION) != 0;
 	struct bin_entry some[RUN];
 	struct warp_target target;
-	uint32_t far[FAR_CELLS], n = 0;
+	uint32_t far[FAR_CELLS], n = 0, n_unheld = 0;
 
 	warp_target_make(&target, plan, into->stack, tile, into->own);
 	target.sum = into->sum + (size_t)target.y0 * plan->width + target.x0;
@@ -64,7 +77,12 @@ void ewa_tile(const struct simd *simd, const struct plan *plan, const struct bin
 		some[n++] = *entry;
 		if (n == RUN) {
 			simd->ewa_sums(&target, some, n);
+			n_unheld += n;
 			n = 0;
+			if (n_unheld >= MOST_UNHELD) {
+				hold_weights(&target);
+				n_unheld = 0;
+			}
 		}
 	}
 	simd->ewa_sums(&target, some, n);

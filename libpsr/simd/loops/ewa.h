@@ -318,7 +318,7 @@ static inline __attribute__((always_inline)) uint64_t ewa_sums_by(struct ewa_par
 		uint32_t others[EWA_ROOM], n_others = 0;
 
 		ewa_place(&l, t);
-		ewa_turn(&l);
+		ewa_look(&l);
 		ones.n = 0;
 		for (uint32_t i = 0; i < l.n; i++) {
 			const uint32_t is_one = l.pixel[i] != UINT32_MAX, pixel = is_one ? l.pixel[i] : 0;

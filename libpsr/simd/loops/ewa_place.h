@@ -41,7 +41,9 @@ struct ewa_leaves {
 	 * near_z. */
 	uint32_t pixel[EWA_ROOM];
 	float pixel_z[EWA_ROOM];
-	uint32_t value[EWA_ROOM][EWA_LANES]; /* as of ewa_sum, of weight 1 */
+	int32_t turned[3][EWA_ROOM]; /* normals in camera space */
+	int is_gray;
+	_Alignas(64) uint32_t value[EWA_ROOM][EWA_LANES]; /* as of ewa_sum, of weight 1 */
 };
 
 static inline float ewa_dot(const float m[3], float x, float y, float z)
@@ -261,29 +263,37 @@ static inline int32_t ewa_round(float x)
 	return psr_floor_int(x + 0.5f);
 }
 
-/* Reads the colours of the n leaves that a cube has added to the batch. */
+/* Reads the colours of the n leaves that a cube has added to the batch, if it has any. */
 static inline void ewa_read_colors(struct ewa_leaves *l, const struct warp_cube *cube, uint32_t n)
 {
-	for (uint32_t i = l->n - n, j = 0; i < l->n; i++, j++)
-		for (int k = 0; k < 3; k++) {
-			const uint32_t code = cube->color != NULL ? cube->color[j][k] : (uint32_t)(CUBES_GRAY >> 8 * k & 0xff);
-
-			l->value[i][EWA_COLOR + k] = (uint32_t)(int32_t)(psr_srgb_to_linear[code] * EWA_COLOR_ONE + 0.5f);
-		}
+	l->is_gray = cube->color == NULL;
+	for (uint32_t i = l->n - n, j = 0; !l->is_gray && i < l->n; i++, j++)
+		for (int k = 0; k < 3; k++)
+			l->value[i][EWA_COLOR + k] =
+				(uint32_t)(int32_t)(psr_srgb_to_linear[cube->color[j][k]] * EWA_COLOR_ONE + 0.5f);
 }
 
-/* Finds normals in camera space. */
-static inline void ewa_turn(struct ewa_leaves *l)
+/* Finds all values but colours: normals in camera space, and of those without colours gray. */
+static inline void ewa_look(struct ewa_leaves *l)
 {
-	const float(*turn)[3] = l->in->turn;
+	const uint32_t n = ewa_lanes(l), gray = (uint32_t)(int32_t)(psr_srgb_to_linear[CUBES_GRAY & 0xff] * EWA_COLOR_ONE + 0.5f);
+	const uint32_t plain[EWA_LANES] = { [EWA_WEIGHT] = 1, [EWA_COLOR] = gray, gray, gray };
+	float turn[3][3];
 
-	for (uint32_t i = 0; i < l->n; i++) {
+	memcpy(turn, l->in->turn, sizeof turn);
+	for (uint32_t i = 0; i < n; i++) {
 		const float side = psr_choose(((l->kind[i] & EWA_TURNS) != 0) & (l->facing[i] > 0), -1, 1);
 		const float nx = side * l->normal[0][i], ny = side * l->normal[1][i], nz = side * l->normal[2][i];
 
+		for (int k = 0; k < 3; k++)
+			l->turned[k][i] = ewa_round(ewa_dot(turn[k], nx, ny, nz));
+	}
+	for (uint32_t i = 0; i < l->n; i++) {
+		if (l->is_gray)
+			memcpy(l->value[i], plain, sizeof plain);
 		l->value[i][EWA_WEIGHT] = 1;
 		for (int k = 0; k < 3; k++)
-			l->value[i][EWA_NORMAL + k] = (uint32_t)ewa_round(ewa_dot(turn[k], nx, ny, nz));
+			l->value[i][EWA_NORMAL + k] = (uint32_t)l->turned[k][i];
 		l->value[i][EWA_LANES - 1] = 0;
 	}
 }

@@ -20,7 +20,7 @@
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
 	.warp_cells = warp_cells,                      \
-	.warp = warp_##isa,                           \
+	.warp = warp_##isa,                            \
 	.warp_leaves = warp_leaves_##isa,              \
 	.warp_points = warp_points,                    \
 	.ewa_words = ewa_words_##isa,                  \
