@@ -284,6 +284,12 @@ TRUTH      := $(BUILD)/tests/bench/truth
 BUDGET     := $(BUILD)/tests/bench/budget
 LARGE      := $(BUILD)/tests/bench/large
 LARGE_OCTREE := $(BUILD)/tests/bench/large_octree
+# Benchmarks run by hand, but are built with the tests, so that they are there when somebody wants to know. FRAMES needs
+# packages that no test needs.
+ifeq ($(config),release)
+TEST_BIN   += $(BENCH) $(EFFECTS) $(CANCEL) $(POOL_BENCH) $(OCTREE_BENCH) $(CODEC_BENCH) $(DAEMON_BENCH) $(REPROJECT_BENCH) $(VIEW_BENCH) \
+	$(LATENCY) $(FIRST) $(TRUTH) $(BUDGET) $(LARGE) $(LARGE_OCTREE)
+endif
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))

@@ -90,7 +90,7 @@ void representations_note(struct psr_report *report, const struct psr_scene *sce
 	}
 }
 
-void report_add(struct psr_report *sum, const struct psr_report *one, unsigned pass)
+void frame_report_add(struct psr_report *sum, const struct psr_report *one, unsigned pass)
 {
 	for (int s = 0; s < PSR_N_STAGES; s++) {
 		sum->ns[s] += one->ns[s];

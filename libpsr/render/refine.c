@@ -229,7 +229,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 		.stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
-	report_add(&frame->report, &fine.report, pass);
+	frame_report_add(&frame->report, &fine.report, pass);
 	return loop(still, (int)((to_y - from_y) >> pass), average_row, &part);
 }
 

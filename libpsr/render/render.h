@@ -22,7 +22,7 @@ void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why
 /* Counts the instances of a scene by what they are drawn as. */
 void representations_note(struct psr_report *report, const struct psr_scene *scene);
 /* Adds the report of a window of a refined picture, whose side has 2^pass times as many pixels. */
-void report_add(struct psr_report *sum, const struct psr_report *one, unsigned pass);
+void frame_report_add(struct psr_report *sum, const struct psr_report *one, unsigned pass);
 
 /* For tests: replaces the kernels. */
 void renderer_use(struct psr_renderer *renderer, const struct simd *simd);
