@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include "base/clock.h"
@@ -18,6 +20,8 @@
 #define TINY 64
 #define ROUND 500 /* frames */
 #define MOST_ROUNDS 200
+#define REQUEST_BYTES 152 /* some FRAME message */
+#define MOST_ANSWER_BYTES (1 << 20)
 
 /* ---- 7: memory ---- */
 
@@ -75,15 +79,20 @@ struct bare {
 
 static void drop(struct outq_chunk *first, void *userdata)
 {
-	(void)userdata;
+	size_t *n_bytes = userdata;
+
+	for (const struct outq_chunk *chunk = first; chunk != NULL; chunk = chunk->next)
+		*n_bytes += chunk->size;
 	outq_chunks_destroy(first);
 }
 
-static void draw_bare(struct bare *bare, int i)
+/* Returns the bytes of the answer. */
+static size_t draw_bare(struct bare *bare, int i)
 {
+	size_t n_bytes = 0;
 	static const uint8_t background[3];
 	const struct codec_answer answer = { .id = 1, .request = &bare->request, .scale = 1, .background = background,
-		                                 .emit = drop };
+		                                 .emit = drop, .userdata = &n_bytes };
 	struct codec_result result;
 	struct psr_settings settings;
 	struct psr_scene scene;
@@ -94,6 +103,7 @@ static void draw_bare(struct bare *bare, int i)
 	if (psr_render(bare->renderer, &scene, &settings, NULL, &bare->frame, &err) != PSR_OK
 	    || codec_encode(&result, bare->codec, NULL, &answer, &bare->frame, &err) != PSR_OK)
 		report_die("psr_render", err.text);
+	return n_bytes;
 }
 
 /* Microseconds a frame. */
@@ -176,24 +186,104 @@ static void bare_fini(struct bare *bare)
 	free(bare->frame.rgb);
 }
 
-/* In turn with the bare frames, so that both see the same machine. Returns the median of what the daemon takes beyond. */
+/* ---- the least that a server can be ---- */
+
+/* Waits for a request, draws, sends an answer of as many bytes, and knows nothing else: no protocol, no other client, no
+ * thread. What it takes beyond drawing is the system's. */
+struct least {
+	struct daemon_server server; /* its process alone */
+	int fd;
+};
+
+static void serve_least(struct bare *bare, int fd)
+{
+	static uint8_t request[REQUEST_BYTES], answer[MOST_ANSWER_BYTES];
+	struct epoll_event event = { .events = EPOLLIN };
+	const int epoll = epoll_create1(0);
+
+	if (epoll < 0 || epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event) != 0)
+		_exit(1);
+	for (int i = 0;; i++) {
+		if (epoll_wait(epoll, &event, 1, -1) != 1 || recv(fd, request, sizeof request, 0) != sizeof request)
+			_exit(0);
+		const size_t n_bytes = draw_bare(bare, i);
+
+		memcpy(answer, &n_bytes, sizeof n_bytes);
+		if (n_bytes < sizeof n_bytes || n_bytes > sizeof answer
+		    || send(fd, answer, n_bytes, MSG_NOSIGNAL) != (ssize_t)n_bytes)
+			_exit(1);
+	}
+}
+
+static void least_start(struct least *least, struct bare *bare)
+{
+	int pair[2];
+
+	if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0)
+		report_die("socketpair", "failed");
+	fflush(NULL);
+	least->server.pid = fork();
+	if (least->server.pid == 0) {
+		close(pair[0]);
+		serve_least(bare, pair[1]);
+	}
+	close(pair[1]);
+	least->fd = pair[0];
+}
+
+static void least_stop(struct least *least)
+{
+	close(least->fd);
+	waitpid(least->server.pid, NULL, 0);
+}
+
+/* Microseconds a frame of its process. */
+static double time_least(struct least *least)
+{
+	static uint8_t request[REQUEST_BYTES], answer[MOST_ANSWER_BYTES];
+	const double start_s = daemon_processor_s(&least->server);
+
+	for (int i = 0; i < ROUND; i++) {
+		size_t n_wanted = sizeof n_wanted, n = 0;
+
+		if (send(least->fd, request, sizeof request, MSG_NOSIGNAL) != sizeof request)
+			report_die("the least server", "has ended");
+		while (n < n_wanted) {
+			const ssize_t got = recv(least->fd, answer + n, sizeof answer - n, 0);
+
+			if (got <= 0)
+				report_die("the least server", "has ended");
+			n += (size_t)got;
+			if (n >= sizeof n_wanted)
+				memcpy(&n_wanted, answer, sizeof n_wanted);
+		}
+	}
+	return (daemon_processor_s(&least->server) - start_s) * 1e6 / ROUND;
+}
+
+/* By turns, so that all see the same machine. Returns the median of what the daemon takes beyond the bare frames. */
 static double measure_beyond(const struct daemon_bench *bench, const struct daemon_server *server, struct link *link)
 {
-	double bare_us[MOST_ROUNDS], us[MOST_ROUNDS], beyond_us[MOST_ROUNDS];
+	double bare_us[MOST_ROUNDS], beyond_us[MOST_ROUNDS], least_us[MOST_ROUNDS];
 	const double start = clock_seconds();
+	struct least least;
 	struct bare bare;
 	size_t n = 0;
 
 	bare_init(&bare, link->film, &link->frame);
+	least_start(&least, &bare);
 	time_bare(&bare);
+	time_least(&least);
 	while (n < MOST_ROUNDS && (n < 3 || clock_seconds() - start < bench->seconds)) {
 		bare_us[n] = time_bare(&bare);
-		us[n] = time_daemon(server, link);
-		beyond_us[n] = us[n] - bare_us[n];
+		beyond_us[n] = time_daemon(server, link) - bare_us[n];
+		least_us[n] = time_least(&least) - bare_us[n];
 		n++;
 	}
+	least_stop(&least);
 	bare_fini(&bare);
 	daemon_figure(bench, "psr_render() and encoding alone", "us", stats_median(bare_us, n), DAEMON_NO_BOUND, 0);
+	daemon_figure(bench, "a loop of epoll, recv, these, send", "us", stats_median(least_us, n), DAEMON_NO_BOUND, 0);
 	return stats_median(beyond_us, n);
 }
 
