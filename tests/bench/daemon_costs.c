@@ -20,7 +20,7 @@
 #define TINY 64
 #define ROUND 500 /* frames */
 #define MOST_ROUNDS 200
-#define REQUEST_BYTES 152 /* some FRAME message */
+#define REQUEST_BYTES 176 /* of a FRAME message */
 #define MOST_ANSWER_BYTES (1 << 20)
 
 /* ---- 7: memory ---- */
