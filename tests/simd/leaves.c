@@ -1,5 +1,5 @@
-/* warp_leaves, and as EWA splats ewa_words and ewa_sums: cubes of 1 to 64 leaves at several levels, with and without normals and offsets, in tiles of pictures of
- * all sizes. */
+/* warp_leaves, and as EWA splats ewa_words and ewa_sums: cubes of 1 to 64 leaves at several levels, with and without
+ * normals and offsets, in tiles of pictures of all sizes. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -222,6 +222,14 @@ static void random_splat_sums(struct check *c)
 	draw_cubes(c, &p, SUMS, check_below(c, 20), 0, PLAIN);
 }
 
+static void spoilt_splats(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	draw_cubes(c, &p, check_one_in(c, 2) ? WORDS : SUMS, 1 + check_below(c, 4), 0, SPOILT);
+}
+
 static void bench_splat_words(struct check *c)
 {
 	struct picture p;
@@ -270,6 +278,7 @@ int main(int argc, char **argv)
 		{ "warp_leaves: tiles narrower than a vector", narrow_tiles, 500, NULL },
 		{ "ewa_words: random cubes and tiles", random_splat_words, 12, NULL },
 		{ "ewa_sums: random cubes and tiles", random_splat_sums, 12, NULL },
+		{ "ewa_words and ewa_sums: infinite, huge, denormal and no numbers", spoilt_splats, 60, NULL },
 		{ "ewa_words, cubes a fourth full", bench_splat_words, 0, "leaf" },
 		{ "ewa_sums, these", bench_splat_sums, 0, "leaf" },
 		{ "warp_leaves, full cubes", bench_full, 0, "leaf" },

@@ -1,34 +1,6 @@
 /* EWA splats: what compilers' vectors are poor at, listing cubes. */
 #include "simd/loops/ewa.h"
-#include "warp_parts.h"
-
-static inline __m256 rows_of(const struct warp_cube *cube, int a)
-{
-	__m128 part[2];
-
-	for (int h = 0; h < 2; h++)
-		part[h] = _mm256_cvtpd_ps(
-			_mm256_add_pd(_mm256_set1_pd(cube->origin[a]), _mm256_loadu_pd(cube->octants->row[a] + 4 * h)));
-	return _mm256_set_m128(part[1], part[0]);
-}
-
-static inline __m256i normals_of(const uint16_t *normal, uint32_t n)
-{
-	uint16_t some[8] = { 0 };
-
-	if (n < 8)
-		memcpy(some, normal, n * sizeof *some);
-	return _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(n < 8 ? some : normal)));
-}
-
-static inline __m256 offsets_of(const uint8_t *offset, uint32_t n)
-{
-	uint64_t some = 0;
-
-	memcpy(&some, offset, n < 8 ? n : sizeof some);
-	const __m256i step = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)some));
-	return _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_add_epi32(step, step), _mm256_set1_epi32(WARP_OFFSET_MIDDLE)));
-}
+#include "leaf_parts.h"
 
 static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry,
                                const struct warp_cube *cube)
@@ -51,19 +23,13 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 		__m256 offset = _mm256_setzero_ps();
 
 		if (cube->normal != NULL)
-			components_of(normal, tens_of(t, normals_of(cube->normal + i, n - i)));
+			components_of(normal, tens_of(t, normals_of(cube->normal + i, (int)(n - i))));
 		if (cube->offset != NULL)
-			offset = offsets_of(cube->offset + i, n - i);
+			offset = offsets_of(cube->offset + i, (int)(n - i));
 		for (int a = 0; a < 3; a++) {
-			const float *along = octants->along[a];
-			const __m256 x = _mm256_mul_ps(_mm256_set1_ps(along[0]), normal[0]);
-			const __m256 y = _mm256_mul_ps(_mm256_set1_ps(along[1]), normal[1]);
-			const __m256 z = _mm256_mul_ps(_mm256_set1_ps(along[2]), normal[2]);
-			const __m256 middle = _mm256_add_ps(_mm256_permutevar8x32_ps(rows[a], octant),
-			                                    _mm256_permutevar8x32_ps(_mm256_loadu_ps(octants->col[a]), leaf));
-			const __m256 by = _mm256_mul_ps(_mm256_add_ps(_mm256_add_ps(x, y), z), offset);
+			const __m256 middle = axis_of(rows[a], octants->col[a], octant, leaf);
 
-			_mm256_storeu_ps(l->at[a] + to, _mm256_add_ps(middle, by));
+			_mm256_storeu_ps(l->at[a] + to, _mm256_add_ps(middle, offset_axis(octants, a, normal, offset)));
 			_mm256_storeu_ps(l->normal[a] + to, normal[a]);
 		}
 		_mm256_storeu_ps(l->edge + to, edge);
@@ -73,7 +39,7 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 	l->n += n;
 }
 
-static const struct ewa_parts parts = { list_leaves, ewa_draw_words, ewa_draw_sums };
+static const struct ewa_parts parts = { list_leaves, ewa_sort_words, ewa_sort_sums, ewa_draw_words, ewa_draw_sums };
 
 uint64_t ewa_words_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {

@@ -1,50 +1,6 @@
 /* The warp of leaves: two terms a place, as [B] (1), and where a leaf is wider than a pixel its offset. */
 #include "simd/leaves_list.h"
-#include "warp_parts.h"
-
-static inline __m256 rows_of(const struct warp_cube *cube, int a)
-{
-	__m128 part[2];
-
-	for (int h = 0; h < 2; h++)
-		part[h] = _mm256_cvtpd_ps(
-			_mm256_add_pd(_mm256_set1_pd(cube->origin[a]), _mm256_loadu_pd(cube->octants->row[a] + 4 * h)));
-	return _mm256_set_m128(part[1], part[0]);
-}
-
-static inline __m256 axis_of(__m256 rows, const float *columns, __m256i octant, __m256i leaf)
-{
-	return _mm256_add_ps(_mm256_permutevar8x32_ps(rows, octant),
-	                     _mm256_permutevar8x32_ps(_mm256_loadu_ps(columns), leaf));
-}
-
-static inline __m256 offset_axis(const struct warp_octants *octants, int a, const __m256 n[3], __m256 offset)
-{
-	const float *along = octants->along[a];
-	const __m256 x = _mm256_mul_ps(n[0], _mm256_set1_ps(along[0])), y = _mm256_mul_ps(n[1], _mm256_set1_ps(along[1]));
-	const __m256 z = _mm256_mul_ps(n[2], _mm256_set1_ps(along[2]));
-
-	return _mm256_mul_ps(_mm256_add_ps(_mm256_add_ps(x, y), z), offset);
-}
-
-/* Normals of the next n or 8 leaves, and their offsets. */
-static inline __m256i normals_of(const uint16_t *normal, int n)
-{
-	uint16_t some[8] = { 0 };
-
-	if (n < 8)
-		memcpy(some, normal, (size_t)n * sizeof *some);
-	return _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(n < 8 ? some : normal)));
-}
-
-static inline __m256 offsets_of(const uint8_t *offset, int n)
-{
-	uint64_t some = 0;
-
-	memcpy(&some, offset, n < 8 ? (size_t)n : sizeof some);
-	const __m256i step = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)some));
-	return _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_add_epi32(step, step), _mm256_set1_epi32(WARP_OFFSET_MIDDLE)));
-}
+#include "leaf_parts.h"
 
 static inline __attribute__((always_inline)) void list_cube(struct words *words, struct cells *cells,
                                                             const struct warp_target *t, const struct bin_entry *entry,

@@ -1,13 +1,6 @@
 /* EWA splats: what compilers' vectors are poor at. Cubes are listed by permutations, and rows of masks take two vectors. */
 #include "simd/loops/ewa.h"
-#include "warp_parts.h"
-
-static inline __m512 rows_of(const struct warp_cube *cube, int a)
-{
-	const __m512d at = _mm512_add_pd(_mm512_set1_pd(cube->origin[a]), _mm512_loadu_pd(cube->octants->row[a]));
-
-	return _mm512_castps256_ps512(_mm512_cvtpd_ps(at));
-}
+#include "leaf_parts.h"
 
 static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t, const struct bin_entry *entry,
                                const struct warp_cube *cube)
@@ -17,12 +10,11 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 	const __m512i id = _mm512_set1_epi32((int)cube->id), kind = _mm512_set1_epi32(ewa_kind_of(t, entry));
 	const uint32_t n = (uint32_t)__builtin_popcountll(cube->mask);
 	_Alignas(64) uint8_t lane[64];
-	__m512 rows[3], columns[3], normal[3];
+	__m512 rows[3], normal[3];
 
 	list_lanes(lane, cube->mask);
 	for (int a = 0; a < 3; a++) {
 		rows[a] = rows_of(cube, a);
-		columns[a] = _mm512_castps256_ps512(_mm256_loadu_ps(octants->col[a]));
 		normal[a] = _mm512_setzero_ps();
 	}
 	for (uint32_t i = 0, to = l->n; i < n; i += 16, to += 16) {
@@ -33,22 +25,12 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 
 		if (cube->normal != NULL)
 			components_of(normal, tens_of(t, _mm512_cvtepu16_epi32(_mm256_maskz_loadu_epi16(valid, cube->normal + i))));
-		if (cube->offset != NULL) {
-			const __m512i step = _mm512_cvtepu8_epi32(_mm_maskz_loadu_epi8(valid, cube->offset + i));
-
-			offset = _mm512_cvtepi32_ps(
-				_mm512_sub_epi32(_mm512_add_epi32(step, step), _mm512_set1_epi32(WARP_OFFSET_MIDDLE)));
-		}
+		if (cube->offset != NULL)
+			offset = offsets_of(cube->offset + i, valid);
 		for (int a = 0; a < 3; a++) {
-			const float *along = octants->along[a];
-			const __m512 x = _mm512_mul_ps(_mm512_set1_ps(along[0]), normal[0]);
-			const __m512 y = _mm512_mul_ps(_mm512_set1_ps(along[1]), normal[1]);
-			const __m512 z = _mm512_mul_ps(_mm512_set1_ps(along[2]), normal[2]);
-			const __m512 middle =
-				_mm512_add_ps(_mm512_permutexvar_ps(octant, rows[a]), _mm512_permutexvar_ps(leaf, columns[a]));
-			const __m512 by = _mm512_mul_ps(_mm512_add_ps(_mm512_add_ps(x, y), z), offset);
+			const __m512 middle = axis_of(rows[a], octants->col[a], octant, leaf);
 
-			_mm512_storeu_ps(l->at[a] + to, _mm512_add_ps(middle, by));
+			_mm512_storeu_ps(l->at[a] + to, _mm512_add_ps(middle, offset_axis(octants, a, normal, offset)));
 			_mm512_storeu_ps(l->normal[a] + to, normal[a]);
 		}
 		_mm512_storeu_ps(l->edge + to, edge);
@@ -118,10 +100,19 @@ static inline __m512 words_of(const uint64_t *row, __mmask16 k)
 	return _mm512_castsi512_ps(_mm512_permutex2var_epi32(low, upper, high));
 }
 
+/* Adds a splat to two pixels, or to those of them whose bits are set. */
+static inline void add_pair(uint32_t *to, uint32_t bits, __m512i own, __m512i weights)
+{
+	static const __mmask16 lanes[4] = { 0, 0xff, 0xff00, 0xffff };
+	const __mmask16 some = lanes[bits & 3];
+
+	_mm512_mask_storeu_epi32(to, some,
+	                         _mm512_add_epi32(_mm512_maskz_loadu_epi32(some, to), _mm512_mullo_epi32(own, weights)));
+}
+
 static inline void draw_sums(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part,
                              float same, const uint32_t value[EWA_LANES])
 {
-	static const __mmask16 lanes[4] = { 0, 0xff, 0xff00, 0xffff };
 	const __mmask16 columns = columns_of(one, part);
 	const __m512 across = across_of(one), behind = _mm512_set1_ps(same);
 	const __m512i own = _mm512_broadcast_i64x4(_mm256_loadu_si256((const __m256i *)value)), two = _mm512_set1_epi32(2);
@@ -130,26 +121,90 @@ static inline void draw_sums(const struct warp_target *t, const struct ewa_one *
 	const uint64_t *row = t->word + (ptrdiff_t)(part->y0 - t->y0) * t->stride + left;
 	struct ewa_sum *sum = t->sum + (ptrdiff_t)(part->y0 - t->y0) * t->sum_stride + left;
 	const uint8_t *weight = one->weight + (part->y0 - one->y + one->radius) * one->next;
+	const int is_narrow = one->radius == 1;
 
 	for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, sum += t->sum_stride, weight += one->next) {
 		const __m128i bytes = _mm_maskz_loadu_epi8(columns, weight);
 		const __m512i weights = _mm512_cvtepu8_epi32(bytes);
 		__mmask16 k = _mm_test_epi8_mask(bytes, bytes);
+		__m512i pair = first;
+		uint32_t *to = sum->lane;
 
 		k = _mm512_mask_cmp_ps_mask(k, _mm512_sub_ps(depths_of(one, across, y - one->y), behind), words_of(row, k),
 		                            _CMP_LE_OQ);
-		__m512i pair = first;
-		uint32_t *to = sum->lane;
-		for (uint32_t left_over = k; left_over; left_over >>= 2, pair = _mm512_add_epi32(pair, two), to += 2 * EWA_LANES) {
-			const __mmask16 some = lanes[left_over & 3];
-			const __m512i by = _mm512_mullo_epi32(own, _mm512_permutexvar_epi32(pair, weights));
-
-			_mm512_mask_storeu_epi32(to, some, _mm512_add_epi32(_mm512_maskz_loadu_epi32(some, to), by));
+		if (is_narrow) { /* three pixels: a branch on each row's would cost more */
+			add_pair(to, k, own, _mm512_permutexvar_epi32(first, weights));
+			add_pair(to + 2 * EWA_LANES, k >> 2, own, _mm512_permutexvar_epi32(_mm512_add_epi32(first, two), weights));
+			continue;
 		}
+		for (uint32_t rest = k; rest; rest >>= 2, pair = _mm512_add_epi32(pair, two), to += 2 * EWA_LANES)
+			add_pair(to, rest, own, _mm512_permutexvar_epi32(pair, weights));
 	}
 }
 
-static const struct ewa_parts parts = { list_leaves, draw_words, draw_sums };
+static inline void list_masks(struct ewa_sorted *sorted, const struct ewa_leaves *l, uint32_t i, __m512i number)
+{
+	const __m512i has_mask = _mm512_loadu_si512(l->has_mask + i);
+	const __mmask16 k = _mm512_test_epi32_mask(has_mask, has_mask);
+
+	_mm512_storeu_si512(sorted->mask + sorted->n_masks, _mm512_maskz_compress_epi32(k, number));
+	sorted->n_masks += (uint32_t)__builtin_popcount(k);
+}
+
+static inline uint32_t sort_words(struct words *words, struct ewa_sorted *sorted, const struct ewa_leaves *l,
+                                  const struct warp_target *t)
+{
+	const __m512i none = _mm512_set1_epi32(-1);
+	const __m512 near_z = _mm512_set1_ps(t->near_z);
+	__m512i number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+	uint32_t n_inside = 0;
+
+	sorted->n_masks = 0;
+	for (uint32_t i = 0; i < l->n; i += 16, number = _mm512_add_epi32(number, _mm512_set1_epi32(16))) {
+		const __m512i pixel = _mm512_loadu_si512(l->pixel + i);
+		const __m512 z = _mm512_loadu_ps(l->pixel_z + i);
+		const __mmask16 is_one = _mm512_cmpneq_epi32_mask(pixel, none);
+		const struct warped ones = { pixel, _mm512_loadu_si512(l->id + i), _mm512_castps_si512(z),
+			                         _mm512_setzero_si512() };
+
+		n_inside += (uint32_t)__builtin_popcount(is_one);
+		words->n =
+			list_words(words, words->n, NULL, 1, _mm512_mask_cmp_ps_mask(is_one, z, near_z, _CMP_GT_OQ), ones);
+		list_masks(sorted, l, i, number);
+	}
+	return n_inside;
+}
+
+static inline void sort_sums(struct ewa_sorted *sorted, const struct ewa_leaves *l, const struct warp_target *t)
+{
+	const __m512i none = _mm512_set1_epi32(-1), x0 = _mm512_set1_epi32(t->x0), y0 = _mm512_set1_epi32(t->y0);
+	const __m512i stride = _mm512_set1_epi32((int)t->sum_stride), byte = _mm512_set1_epi32(255);
+	__m512i number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+	uint32_t n = 0;
+
+	sorted->n_masks = 0;
+	for (uint32_t i = 0; i < l->n; i += 16, number = _mm512_add_epi32(number, _mm512_set1_epi32(16))) {
+		const __m512i pixel = _mm512_loadu_si512(l->pixel + i), mask = _mm512_loadu_si512(l->mask + i);
+		__mmask16 k = _mm512_cmpneq_epi32_mask(pixel, none);
+		const __m512 own = _mm512_mask_i32gather_ps(_mm512_setzero_ps(), k, pixel, (const uint32_t *)t->word + 1, 8);
+		const __m512 z = _mm512_sub_ps(_mm512_loadu_ps(l->pixel_z + i), _mm512_loadu_ps(l->same + i));
+
+		k = _mm512_mask_cmp_ps_mask(k, z, own, _CMP_LE_OQ);
+		const __m512i weight = _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), k, mask, ewa_weight, 1);
+		const __m512i x = _mm512_sub_epi32(_mm512_loadu_si512(l->x + i), x0);
+		const __m512i y = _mm512_sub_epi32(_mm512_loadu_si512(l->y + i), y0);
+
+		_mm512_storeu_si512(sorted->sum + n,
+		                    _mm512_maskz_compress_epi32(k, _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x)));
+		_mm512_storeu_si512(sorted->weight + n, _mm512_maskz_compress_epi32(k, _mm512_and_si512(weight, byte)));
+		_mm512_storeu_si512(sorted->one + n, _mm512_maskz_compress_epi32(k, number));
+		n += (uint32_t)__builtin_popcount(k);
+		list_masks(sorted, l, i, number);
+	}
+	sorted->n_ones = n;
+}
+
+static const struct ewa_parts parts = { list_leaves, sort_words, sort_sums, draw_words, draw_sums };
 
 uint64_t ewa_words_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {

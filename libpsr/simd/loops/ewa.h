@@ -188,8 +188,62 @@ static inline void ewa_draw_wide(const struct warp_target *t, const struct ewa_l
 
 /* ---- kernels ---- */
 
+/* Leaves of a batch by what is drawn of them: those with masks of more than a pixel; and of those of a single pixel that
+ * pass, place in sums, weight and number. */
+struct ewa_sorted {
+	uint32_t n_masks, n_ones;
+	uint32_t mask[EWA_ROOM], sum[EWA_ROOM], weight[EWA_ROOM], one[EWA_ROOM];
+};
+
+/* Sorts a batch: lists the words of leaves of a single pixel, and returns how many are in the tile; there is room. */
+typedef uint32_t ewa_sort_words_fn(struct words *words, struct ewa_sorted *sorted, const struct ewa_leaves *l,
+                                   const struct warp_target *t);
+/* Sorts a batch for sums. */
+typedef void ewa_sort_sums_fn(struct ewa_sorted *sorted, const struct ewa_leaves *l, const struct warp_target *t);
+
+static inline uint32_t ewa_sort_words(struct words *words, struct ewa_sorted *sorted, const struct ewa_leaves *l,
+                                      const struct warp_target *t)
+{
+	uint32_t n_inside = 0, n_words = words->n, n_masks = 0;
+
+	for (uint32_t i = 0; i < l->n; i++) {
+		const uint32_t is_one = l->pixel[i] != UINT32_MAX;
+
+		words->word[n_words] = (uint64_t)psr_bits_from_float(l->pixel_z[i]) << 32 | l->id[i];
+		words->at[n_words] = l->pixel[i];
+		n_inside += is_one;
+		n_words += is_one & (l->pixel_z[i] > t->near_z);
+		sorted->mask[n_masks] = i;
+		n_masks += (uint32_t)l->has_mask[i];
+	}
+	words->n = n_words;
+	sorted->n_masks = n_masks;
+	return n_inside;
+}
+
+static inline void ewa_sort_sums(struct ewa_sorted *sorted, const struct ewa_leaves *l, const struct warp_target *t)
+{
+	uint32_t n_ones = 0, n_masks = 0;
+
+	for (uint32_t i = 0; i < l->n; i++) {
+		const uint32_t is_one = l->pixel[i] != UINT32_MAX, pixel = is_one ? l->pixel[i] : 0;
+		const float own = psr_float_from_bits((uint32_t)(t->word[pixel] >> 32));
+
+		sorted->sum[n_ones] = (uint32_t)(l->y[i] - t->y0) * t->sum_stride + (uint32_t)(l->x[i] - t->x0);
+		sorted->weight[n_ones] = ewa_weight[l->mask[i]];
+		sorted->one[n_ones] = i;
+		n_ones += is_one & (l->pixel_z[i] - l->same[i] <= own);
+		sorted->mask[n_masks] = i;
+		n_masks += (uint32_t)l->has_mask[i];
+	}
+	sorted->n_ones = n_ones;
+	sorted->n_masks = n_masks;
+}
+
 struct ewa_parts {
 	ewa_list_fn *list;
+	ewa_sort_words_fn *sort_words;
+	ewa_sort_sums_fn *sort_sums;
 	ewa_draw_words_fn *draw_words;
 	ewa_draw_sums_fn *draw_sums;
 };
@@ -250,6 +304,7 @@ static inline __attribute__((always_inline)) uint64_t ewa_words_by(struct ewa_pa
 {
 	struct ewa_reader reader = { .t = t, .entry = entry, .n = n };
 	struct ewa_leaves l;
+	struct ewa_sorted sorted;
 	struct words words;
 	struct ewa_one one;
 	struct ewa_part part;
@@ -257,23 +312,12 @@ static inline __attribute__((always_inline)) uint64_t ewa_words_by(struct ewa_pa
 
 	words.n = 0;
 	while (ewa_fill(&l, &reader, parts.list, 0)) {
-		uint32_t others[EWA_ROOM], n_others = 0;
-
 		ewa_place(&l, t);
 		if (words.n > LIST - EWA_BATCH)
 			lower_words(t->word, &words);
-		for (uint32_t i = 0; i < l.n; i++) {
-			const uint32_t is_one = l.pixel[i] != UINT32_MAX;
-
-			words.word[words.n] = (uint64_t)psr_bits_from_float(l.pixel_z[i]) << 32 | l.id[i];
-			words.at[words.n] = l.pixel[i];
-			n_inside += is_one;
-			words.n += is_one & (l.pixel_z[i] > t->near_z);
-			others[n_others] = i;
-			n_others += (uint32_t)(l.is_left[i] & (l.size[i] > 0));
-		}
-		for (uint32_t k = 0; k < n_others; k++) {
-			const uint32_t i = others[k];
+		n_inside += parts.sort_words(&words, &sorted, &l, t);
+		for (uint32_t k = 0; k < sorted.n_masks; k++) {
+			const uint32_t i = sorted.mask[k];
 
 			n_inside += (uint64_t)((l.x[i] >= t->x0) & (l.x[i] < t->x1) & (l.y[i] >= t->y0) & (l.y[i] < t->y1));
 			if (l.size[i] == EWA_SIZES) {
@@ -289,19 +333,26 @@ static inline __attribute__((always_inline)) uint64_t ewa_words_by(struct ewa_pa
 	return n_inside;
 }
 
-/* Adds splats of one pixel each. */
-struct ewa_ones {
-	uint32_t n, sum[EWA_ROOM], weight[EWA_ROOM], leaf[EWA_ROOM];
-};
-
-static inline void ewa_add_one(const struct warp_target *t, const struct ewa_ones *ones, const struct ewa_leaves *l,
+static inline void ewa_add_one(const struct warp_target *t, const struct ewa_sorted *sorted, const struct ewa_leaves *l,
                                uint32_t i)
 {
-	uint32_t *to = t->sum[ones->sum[i]].lane;
-	const uint32_t *value = l->value[ones->leaf[i]], w = ones->weight[i];
+	uint32_t *to = t->sum[sorted->sum[i]].lane;
+	const uint32_t *value = l->value[sorted->one[i]], w = sorted->weight[i];
 
 	for (int k = 0; k < EWA_LANES; k++)
 		to[k] += w * value[k];
+}
+
+/* Quarters take turns, as in warp_list.h: successive leaves often fall into one pixel. */
+static inline void ewa_add_ones(const struct warp_target *t, const struct ewa_sorted *sorted, const struct ewa_leaves *l)
+{
+	const uint32_t part = sorted->n_ones / 4;
+
+	for (uint32_t i = 0; i < part; i++)
+		for (uint32_t k = 0; k < 4; k++)
+			ewa_add_one(t, sorted, l, i + k * part);
+	for (uint32_t i = 4 * part; i < sorted->n_ones; i++)
+		ewa_add_one(t, sorted, l, i);
 }
 
 static inline __attribute__((always_inline)) uint64_t ewa_sums_by(struct ewa_parts parts, const struct warp_target *t,
@@ -309,33 +360,19 @@ static inline __attribute__((always_inline)) uint64_t ewa_sums_by(struct ewa_par
 {
 	struct ewa_reader reader = { .t = t, .entry = entry, .n = n };
 	struct ewa_leaves l;
-	struct ewa_ones ones;
+	struct ewa_sorted sorted;
 	struct ewa_one one;
 	struct ewa_part part;
 	uint64_t n_given = 0;
 
 	while (ewa_fill(&l, &reader, parts.list, 1)) {
-		uint32_t others[EWA_ROOM], n_others = 0;
-
 		ewa_place(&l, t);
 		ewa_look(&l);
-		ones.n = 0;
-		for (uint32_t i = 0; i < l.n; i++) {
-			const uint32_t is_one = l.pixel[i] != UINT32_MAX, pixel = is_one ? l.pixel[i] : 0;
-			const float own = psr_float_from_bits((uint32_t)(t->word[pixel] >> 32));
-
-			ones.sum[ones.n] = (uint32_t)(l.y[i] - t->y0) * t->sum_stride + (uint32_t)(l.x[i] - t->x0);
-			ones.weight[ones.n] = ewa_weight[l.mask[i]];
-			ones.leaf[ones.n] = i;
-			ones.n += is_one & (l.pixel_z[i] - l.same[i] <= own);
-			others[n_others] = i;
-			n_others += (uint32_t)(l.is_left[i] & (l.size[i] > 0));
-			n_given += (uint32_t)l.is_left[i];
-		}
-		for (uint32_t i = 0; i < ones.n; i++)
-			ewa_add_one(t, &ones, &l, i);
-		for (uint32_t k = 0; k < n_others; k++) {
-			const uint32_t i = others[k];
+		parts.sort_sums(&sorted, &l, t);
+		ewa_add_ones(t, &sorted, &l);
+		n_given += l.n;
+		for (uint32_t k = 0; k < sorted.n_masks; k++) {
+			const uint32_t i = sorted.mask[k];
 
 			if (l.size[i] == EWA_SIZES) {
 				ewa_draw_wide(t, &l, i, l.same[i], l.value[i]);

@@ -37,10 +37,11 @@ struct ewa_leaves {
 	int32_t size[EWA_ROOM];
 	int32_t mask[EWA_ROOM]; /* shape and sector: of the masks of its size */
 	int32_t is_flipped[EWA_ROOM]; /* the mask, up and down */
-	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile; its z', and 0 unless beyond
-	 * near_z. */
+	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile, and its z'; 1 of others that
+	 * may be drawn. */
 	uint32_t pixel[EWA_ROOM];
 	float pixel_z[EWA_ROOM];
+	int32_t has_mask[EWA_ROOM];
 	int32_t turned[3][EWA_ROOM]; /* normals in camera space */
 	int is_gray;
 	_Alignas(64) uint32_t value[EWA_ROOM][EWA_LANES]; /* as of ewa_sum, of weight 1 */
@@ -230,7 +231,7 @@ static inline void ewa_slope(struct ewa_leaves *l, int perspective)
 	}
 }
 
-/* Finds the pixels of splats of size 0, which have one each. */
+/* Finds the pixels of splats of size 0, which have one each, and which leaves have masks of more. */
 static inline void ewa_find_pixels(struct ewa_leaves *l, const struct warp_target *t)
 {
 	const uint32_t w = (uint32_t)(t->x1 - t->x0), h = (uint32_t)(t->y1 - t->y0), n = ewa_lanes(l), stride = t->stride;
@@ -243,6 +244,7 @@ static inline void ewa_find_pixels(struct ewa_leaves *l, const struct warp_targe
 
 		l->pixel[i] = (y * stride + x) | (0u - (uint32_t)!is_drawn);
 		l->pixel_z[i] = z;
+		l->has_mask[i] = l->is_left[i] & (l->size[i] > 0);
 	}
 }
 
