@@ -494,8 +494,11 @@ hard-large: $(LARGE) $(LARGE_OCTREE) ## hard-large: a model of 100 million sampl
 bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock beside stamps of a relay and psrd's reports, of the same runs
 	$(Q)BUILD=$(BUILD) tests/bench/load.sh
 
-bench-octree: $(OCTREE_BENCH) ## bench-octree: octrees from 20 M points of LAS: time, memory, bits, rates
+bench-octree: $(OCTREE_BENCH) ## bench-octree: octrees from 20 M points of LAS: time, memory, bits, rates; splats beside points, of the bunny
 	$(Q)$(BUILD)/tests/bench/octree
+	$(Q)if [ -f $(fetched)/bunny.obj ]; then $(BUILD)/tests/bench/octree_draws -l 10 -s 512 $(fetched)/bunny.obj; \
+	else echo "bunny.obj is not here: make models fetches it"; fi
+
 bench-pool: $(POOL_BENCH) ## bench-pool: what loops and hand-overs between flows cost; a small frame beside large ones; shares
 	$(Q)$(POOL_BENCH)
 

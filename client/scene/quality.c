@@ -66,8 +66,8 @@ void quality_add_splats_option(struct optlist *list, struct quality_wish *wish)
 {
 	const struct psr_opt opts[] = {
 		{ .name = "splats", .type = PSR_OPT_FLAG, .value = &wish->with_splats, .seen = &wish->n_said,
-		  .help = "Octrees as splats, which mix the leaves of a surface, instead of points: smoother and some ten "
-		          "times slower. Not with --passes, nor --quality best." },
+		  .help = "Octrees as splats, which mix the leaves of a surface, instead of points: smoother and some "
+		          "four times slower. Not with --passes, nor --quality best." },
 	};
 
 	OPTLIST_ADD(list, opts);

@@ -19,8 +19,8 @@ enum { EWA_WEIGHT, EWA_NORMAL, EWA_COLOR = EWA_NORMAL + 3, EWA_LANES = 8 };
 struct ewa_sum {
 	_Alignas(32) uint32_t lane[EWA_LANES]; /* normals as int32_t; the last is 0 */
 };
-/* From this weight on, that of 4,112 leaves at least, the other sums may have overflowed: the pixel shows its word's leaf
- * alone. Weights go on, so whoever calls ewa_sums() sees to it that they do not overflow. */
+/* From this weight on, that of 4,112 leaves at least, the other sums may have overflowed: the pixel shows its word's
+ * leaf alone. Weights go on, so whoever calls ewa_sums() sees to it that they do not overflow. */
 #define EWA_MOST_WEIGHT (UINT32_C(1) << 20)
 
 /* The same picture's scale of an octree. Rows A of warp_cubes.axis, of which (7.9) of [G] is made: the places in pixels

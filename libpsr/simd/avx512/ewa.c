@@ -1,4 +1,4 @@
-/* EWA splats: what compilers' vectors are poor at. Cubes are listed by permutations, and rows of masks take two vectors. */
+/* EWA splats: what compilers' vectors are poor at. Cubes are listed by permutations, and masks drawn by rows. */
 #include "simd/loops/ewa.h"
 #include "leaf_parts.h"
 
@@ -44,8 +44,9 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 static inline __mmask16 columns_of(const struct ewa_one *one, const struct ewa_part *part)
 {
 	const int32_t first = one->x - one->radius;
+	const uint32_t before = _bzhi_u32(0xffff, (uint32_t)(part->x0 - first));
 
-	return (__mmask16)(_bzhi_u32(0xffff, (uint32_t)(part->x1 - first)) & ~_bzhi_u32(0xffff, (uint32_t)(part->x0 - first)));
+	return (__mmask16)(_bzhi_u32(0xffff, (uint32_t)(part->x1 - first)) & ~before);
 }
 
 /* What one->zx adds at each of these columns. */
@@ -60,8 +61,9 @@ static inline __m512 across_of(const struct ewa_one *one)
 static inline __m512 depths_of(const struct ewa_one *one, __m512 across, int32_t dy)
 {
 	const __m512 down = _mm512_set1_ps((float)dy * one->zy);
+	const __m512 z = _mm512_add_ps(_mm512_set1_ps(one->z), _mm512_add_ps(across, down));
 
-	return _mm512_max_ps(_mm512_add_ps(_mm512_set1_ps(one->z), _mm512_add_ps(across, down)), _mm512_set1_ps(one->least));
+	return _mm512_max_ps(z, _mm512_set1_ps(one->least));
 }
 
 static inline void lower_eight(uint64_t *row, __mmask8 k, __m256 z, __m512i id)
@@ -95,7 +97,8 @@ static inline void draw_words(const struct warp_target *t, const struct ewa_one 
 static inline __m512 words_of(const uint64_t *row, __mmask16 k)
 {
 	const __m512i upper = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-	const __m512i low = _mm512_maskz_loadu_epi64((__mmask8)k, row), high = _mm512_maskz_loadu_epi64((__mmask8)(k >> 8), row + 8);
+	const __m512i low = _mm512_maskz_loadu_epi64((__mmask8)k, row);
+	const __m512i high = _mm512_maskz_loadu_epi64((__mmask8)(k >> 8), row + 8);
 
 	return _mm512_castsi512_ps(_mm512_permutex2var_epi32(low, upper, high));
 }

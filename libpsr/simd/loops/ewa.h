@@ -9,7 +9,7 @@
 
 struct ewa_one {
 	int32_t x, y, radius;
-	float z, zx, zy, least; /* z' in the middle of pixel (x, y), what a pixel to the right or down adds, and the least */
+	float z, zx, zy, least; /* z' in the middle of pixel (x, y), what a pixel to the right or down adds, the least */
 	const uint8_t *weight;  /* of the first row, */
 	int32_t next;           /* and how far the next row is */
 	uint32_t core, id;
@@ -188,8 +188,8 @@ static inline void ewa_draw_wide(const struct warp_target *t, const struct ewa_l
 
 /* ---- kernels ---- */
 
-/* Leaves of a batch by what is drawn of them: those with masks of more than a pixel; and of those of a single pixel that
- * pass, place in sums, weight and number. */
+/* Leaves of a batch by what is drawn of them: those with masks of more than a pixel; and of those of a single pixel
+ * that pass, place in sums, weight and number. */
 struct ewa_sorted {
 	uint32_t n_masks, n_ones;
 	uint32_t mask[EWA_ROOM], sum[EWA_ROOM], weight[EWA_ROOM], one[EWA_ROOM];
@@ -344,7 +344,8 @@ static inline void ewa_add_one(const struct warp_target *t, const struct ewa_sor
 }
 
 /* Quarters take turns, as in warp_list.h: successive leaves often fall into one pixel. */
-static inline void ewa_add_ones(const struct warp_target *t, const struct ewa_sorted *sorted, const struct ewa_leaves *l)
+static inline void ewa_add_ones(const struct warp_target *t, const struct ewa_sorted *sorted,
+                                const struct ewa_leaves *l)
 {
 	const uint32_t part = sorted->n_ones / 4;
 

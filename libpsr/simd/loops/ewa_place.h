@@ -1,5 +1,5 @@
-/* EWA splats: batches of leaves in the picture. Each step is a loop over a batch, which the compiler turns into vectors;
- * a batch is of one instance, and cubes fill it whatever their levels. */
+/* EWA splats: batches of leaves in the picture. Each step is a loop over a batch, which the compiler turns into
+ * vectors; a batch is of one instance, and cubes fill it whatever their levels. */
 #ifndef PSR_SIMD_LOOPS_EWA_PLACE_H
 #define PSR_SIMD_LOOPS_EWA_PLACE_H
 
@@ -13,7 +13,7 @@
 #define EWA_STEEP 1.0f
 
 #define EWA_BATCH 128  /* leaves; what a batch needs stays in L1 */
-#define EWA_VECTOR 16  /* lanes of the widest vector: steps go on to a multiple, listing may write so many beyond the end */
+#define EWA_VECTOR 16  /* lanes of the widest vector: steps go on to a multiple, lists may be written so far beyond */
 #define EWA_ROOM (EWA_BATCH + EWA_VECTOR)
 
 enum ewa_kind { EWA_MIXED = 1, EWA_TURNS = 2 }; /* may face away; is seen from both sides */
@@ -37,8 +37,8 @@ struct ewa_leaves {
 	int32_t size[EWA_ROOM];
 	int32_t mask[EWA_ROOM]; /* shape and sector: of the masks of its size */
 	int32_t is_flipped[EWA_ROOM]; /* the mask, up and down */
-	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile, and its z'; 1 of others that
-	 * may be drawn. */
+	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile, and its z'; 1 of others
+	 * that may be drawn. */
 	uint32_t pixel[EWA_ROOM];
 	float pixel_z[EWA_ROOM];
 	int32_t has_mask[EWA_ROOM];
@@ -160,7 +160,8 @@ static inline void ewa_shape(struct ewa_leaves *l, int perspective)
 		const float scale = psr_choose(perspective, edge / l->at[2][i], edge), square = scale * scale;
 		const float nx = l->normal[0][i] * (1 / 511.0f), ny = l->normal[1][i] * (1 / 511.0f);
 		const float nz = l->normal[2][i] * (1 / 511.0f), along = ewa_dot(view->axis[2], nx, ny, nz);
-		const float p = ewa_dot(view->axis[0], nx, ny, nz) - u * along, q = ewa_dot(view->axis[1], nx, ny, nz) - v * along;
+		const float p = ewa_dot(view->axis[0], nx, ny, nz) - u * along;
+		const float q = ewa_dot(view->axis[1], nx, ny, nz) - v * along;
 		const float across = ((xx - 2 * u * xz) + u * u * zz) - p * p, down = ((yy - 2 * v * yz) + v * v * zz) - q * q;
 
 		l->across[i] = square * psr_where(across > 0, across);
@@ -278,7 +279,8 @@ static inline void ewa_read_colors(struct ewa_leaves *l, const struct warp_cube 
 /* Finds all values but colours: normals in camera space, and of those without colours gray. */
 static inline void ewa_look(struct ewa_leaves *l)
 {
-	const uint32_t n = ewa_lanes(l), gray = (uint32_t)(int32_t)(psr_srgb_to_linear[CUBES_GRAY & 0xff] * EWA_COLOR_ONE + 0.5f);
+	const uint32_t n = ewa_lanes(l);
+	const uint32_t gray = (uint32_t)(int32_t)(psr_srgb_to_linear[CUBES_GRAY & 0xff] * EWA_COLOR_ONE + 0.5f);
 	const uint32_t plain[EWA_LANES] = { [EWA_WEIGHT] = 1, [EWA_COLOR] = gray, gray, gray };
 	float turn[3][3];
 
