@@ -112,9 +112,7 @@ static void summarize(const char *out, const struct made *made)
 		fprintf(stderr, PROGRAM ": warning: %s: points without a finite place were left out: %" PRIu64 "\n",
 		        made->input.path, made->input.n_left_out);
 	if (psr_model_point_set(made->model) != NULL)
-		printf("%s: %" PRIu64 " differential points of %" PRIu64 ", %.2f MB, from %" PRIu32 " triangles in %.1f s; normals"
-		       " within %.1f degrees\n", out, made->points.n_kept, made->points.n_candidates, (double)file_bytes / 1e6,
-		       mesh->n_triangles, made->points.seconds, made->points.normal_worst / PSR_DEGREE);
+		points_summarize(&made->points, out, file_bytes, mesh->n_triangles);
 	if (tree != NULL)
 		printf("%s: %" PRIu64 " leaves of %.3g in an octree of %d levels, %.1f MB, from %" PRIu64 " %s in %.1f s\n", out,
 		       tree->n_leaves, ldexp(made->tree->edge, -tree->levels), tree->levels, (double)file_bytes / 1e6,
@@ -215,6 +213,7 @@ static int build(const char *in, const char *out, const struct wish *wish, struc
 			warn(made.mesh);
 		if (made.blocks != NULL)
 			warn_of_sheer(made.blocks);
+		points_warn(&made.points, wish->points.error);
 		summarize(out, &made);
 	}
 	psr_model_unref(made.model);
@@ -261,8 +260,6 @@ static int check_octree(const struct wish *wish, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_ARG, "--levels and --spacing both say how fine the octree is; give one of them");
 	if (!wish->is_octree && (wish->octree.levels > 0 || wish->octree.spacing > 0 || wish->octree.with_scan))
 		return psr_fail(err, PSR_ERR_ARG, "--levels, --spacing and --scan are for octrees; add --representation octree");
-	if (!wish->is_points && (wish->points.eps > 0 || wish->points.delta > 0))
-		return psr_fail(err, PSR_ERR_ARG, "--eps and --delta are for differential points; add --representation dpoints");
 	return PSR_OK;
 }
 
@@ -319,6 +316,9 @@ int cmd_build(int argc, char **argv)
 		          " degrees.", .min = 0, .max = 0.5 },
 		{ .name = "delta", .type = PSR_OPT_REAL, .value = &wish.points.delta, .arg = "D",
 		  .help = "And no further than this part of the model's radius. 0: an eighth.", .min = 0, .max = 1 },
+		{ .name = "error", .type = PSR_OPT_CALL, .call = points_take_error, .value = &wish.points, .arg = "PX",
+		  .help = "In place of both: nothing that is drawn is further from the surface than this, in pixels of the resolution,"
+		          " such as 0.5. Default: no bound, and E and D as above." },
 		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
@@ -357,6 +357,8 @@ int cmd_build(int argc, char **argv)
 		choose_representation(&wish, argv[1]);
 	if (code == PSR_OK)
 		code = check_octree(&wish, &err);
+	if (code == PSR_OK)
+		code = points_check(&wish.points, wish.is_points, &err);
 	if (code == PSR_OK)
 		code = check_calibration(&wish, &err);
 	if (code == PSR_OK && fd >= 0 && fcntl((int)fd, F_GETFD) < 0)

@@ -14,15 +14,21 @@ static double epsilon_of(const struct dpoint_set *set)
 	return 1 - sqrt(1 - (double)set->sine * (double)set->sine);
 }
 
-void info_print_points(const struct dpoint_set *set, double scale)
+static double pixels_of(const struct dpoint_set *set, const struct psr_model_info *info)
+{
+	return (double)set->height * info->resolution / 2;
+}
+
+void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info)
 {
 	printf("points            %" PRIu32 " differential points in %" PRIu32 " groups, %.1f bytes a point\n", set->n_points,
 	       set->n_groups, bytes_of(set));
 	printf("  epsilon         %.4g\n", epsilon_of(set));
-	printf("  off by          %.3g at most\n", (double)set->height * scale);
+	printf("  off by          %.3g at most, %.3g pixels of the resolution\n", (double)set->height * info->scale,
+	       pixels_of(set, info));
 }
 
-cJSON *info_points_json(const struct dpoint_set *set, double scale)
+cJSON *info_points_json(const struct dpoint_set *set, const struct psr_model_info *info)
 {
 	cJSON *part = cJSON_CreateObject();
 
@@ -30,6 +36,7 @@ cJSON *info_points_json(const struct dpoint_set *set, double scale)
 	cJSON_AddNumberToObject(part, "groups", set->n_groups);
 	cJSON_AddNumberToObject(part, "bytes_per_point", bytes_of(set));
 	cJSON_AddNumberToObject(part, "epsilon", epsilon_of(set));
-	cJSON_AddNumberToObject(part, "height", (double)set->height * scale);
+	cJSON_AddNumberToObject(part, "height", (double)set->height * info->scale);
+	cJSON_AddNumberToObject(part, "height_pixels", pixels_of(set, info));
 	return part;
 }

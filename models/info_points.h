@@ -5,8 +5,7 @@
 #include <cjson/cJSON.h>
 #include "model/points.h"
 
-/* scale: units of the source an inner unit. */
-void info_print_points(const struct dpoint_set *set, double scale);
-cJSON *info_points_json(const struct dpoint_set *set, double scale);
+void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info);
+cJSON *info_points_json(const struct dpoint_set *set, const struct psr_model_info *info);
 
 #endif

@@ -5,11 +5,20 @@
 #include "base/direction.h"
 #include "base/vec.h"
 #include "look.h"
+#include "rectangle.h"
 
-/* The corners' weights of the place that is x and y grains from the apex along its sides. */
+#define MOST_UNITS (1u << 20) /* of a side */
+
+/* How many units a side has. */
+static uint32_t units_of(const struct cutting *c)
+{
+	return c->n * c->grains * c->units;
+}
+
+/* The corners' weights of the place that is x and y units from the apex along its sides. */
 static void weigh(double weight[3], const struct cutting *c, double x, double y)
 {
-	const double unit = 1.0 / ((double)c->n * c->grains);
+	const double unit = 1.0 / units_of(c);
 
 	weight[(c->apex + 1) % 3] = x * unit;
 	weight[(c->apex + 2) % 3] = y * unit;
@@ -64,7 +73,7 @@ static int local_at(struct dpoint_local *local, const struct cutting *c, const d
 	return 1;
 }
 
-/* A piece begins x and y grains from the apex, and its two sides are `size` long; a triangle if it reaches the longest
+/* A piece begins x and y units from the apex, and its two sides are `size` long; a triangle if it reaches the longest
  * side. */
 struct piece {
 	uint32_t x, y, size;
@@ -72,7 +81,7 @@ struct piece {
 
 static int is_triangle(const struct cutting *c, const struct piece *p)
 {
-	return p->x + p->y + p->size == c->n * c->grains;
+	return p->x + p->y + p->size == units_of(c);
 }
 
 static void weigh_middle(double weight[3], const struct cutting *c, const struct piece *p)
@@ -82,20 +91,32 @@ static void weigh_middle(double weight[3], const struct cutting *c, const struct
 	weigh(weight, c, p->x + half, p->y + half);
 }
 
-static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
+/* Whether the point's rectangle around the cell is within the bound. Where there is no point there is nothing to mend. */
+static int is_within(const struct cutting *c, const struct dpoint_cell *cell, const struct dpoint_local *local,
+                     const struct dpoint_candidate *like)
+{
+	const struct dpoint_cover_options *cover = c->options->cover;
+	struct dpoint_candidate candidate;
+	struct dpoint_limit limit = { .sine = cover->sine };
+	float extent[2];
+
+	if (dpoint_candidate_make(&candidate, local, like) == DPOINT_BAD)
+		return 1;
+	if (!rectangle_around(limit.delta, &candidate, cell, cover))
+		return 0;
+	dpoint_extent(extent, &candidate.point, &limit);
+	return bound_look(c->view, &c->surface->facets, &candidate.point, extent, cover->error) == PSR_OK &&
+	       bound_holds(c->view, extent, cover->error, NULL);
+}
+
+static void cell_of(struct dpoint_cell *cell, struct dpoint_local *local, int *is_good, const struct cutting *c,
+                    const struct piece *p)
 {
 	static const uint32_t square[4][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } };
 	static const uint32_t triangle[4][2] = { { 0, 0 }, { 1, 0 }, { 0, 1 }, { 0, 1 } };
 	const uint32_t (*corner)[2] = is_triangle(c, p) ? triangle : square;
-	const float delta = c->options->delta;
-	struct dpoint_candidate like = { .delta = { delta, delta }, .part = c->material, .point.attr = attr };
-	struct dpoint_cell *cell = dpoint_surface_cell(c->surface);
-	struct dpoint_local local;
 	double weight[3], place[3];
-	int is_good;
 
-	if (cell == NULL)
-		return PSR_ERR_MEMORY;
 	for (int i = 0; i < 4; i++) {
 		weigh(weight, c, p->x + corner[i][0] * p->size, p->y + corner[i][1] * p->size);
 		place_at(place, c, weight);
@@ -104,11 +125,39 @@ static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
 	}
 	memset(cell->normal, 0, sizeof cell->normal);
 	cell->part = c->material;
-	cell->attr = attr;
 	weigh_middle(weight, c, p);
-	is_good = local_at(&local, c, weight);
-	for (int k = 0; k < 3 && is_good; k++)
-		cell->normal[k] = (float)local.axis[2][k];
+	*is_good = local_at(local, c, weight);
+	for (int k = 0; k < 3 && *is_good; k++)
+		cell->normal[k] = (float)local->axis[2][k];
+}
+
+/* The piece, or its quarters where the bound asks for smaller ones. */
+static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
+{
+	const float delta = c->options->delta;
+	const uint32_t half = p->size / 2;
+	struct dpoint_candidate like = { .delta = { delta, delta }, .part = c->material, .point.attr = attr };
+	struct dpoint_cell made, *cell;
+	struct dpoint_local local;
+	int is_good, rc = PSR_OK;
+
+	cell_of(&made, &local, &is_good, c, p);
+	made.attr = attr;
+	if (c->view != NULL && half > 0 && is_good && !is_within(c, &made, &local, &like)) {
+		for (uint32_t i = 0; i < 4 && rc == PSR_OK; i++) {
+			const struct piece part = { p->x + (i & 1) * half, p->y + (i >> 1) * half, half };
+
+			if (part.x + part.y + part.size <= units_of(c))
+				rc = put(c, &part, attr);
+		}
+		return rc;
+	}
+	if (c->surface->n_cells > CUT_MOST_PIECES)
+		return PSR_ERR_LIMIT;
+	cell = dpoint_surface_cell(c->surface);
+	if (cell == NULL)
+		return PSR_ERR_MEMORY;
+	*cell = made;
 	like.cell = (uint32_t)c->surface->n_cells - 1;
 	return dpoint_surface_put(c->surface, is_good ? &local : NULL, &like);
 }
@@ -164,11 +213,11 @@ static int gather(struct seen *seen, const struct cutting *c, const struct piece
 	struct piece part[4];
 	int rc = PSR_OK;
 
-	if (p->x + p->y + p->size > c->n * c->grains) {
+	if (p->x + p->y + p->size > units_of(c)) {
 		*seen = (struct seen){ .kind = SEEN_BEYOND };
 		return PSR_OK;
 	}
-	if (half == 0)
+	if (p->size == c->units)
 		return look_at(seen, c, p);
 	for (uint32_t i = 0; i < 4 && rc == PSR_OK; i++) {
 		part[i] = (struct piece){ p->x + (i & 1) * half, p->y + (i >> 1) * half, half };
@@ -183,11 +232,13 @@ static int gather(struct seen *seen, const struct cutting *c, const struct piece
 
 int cut(const struct cutting *c)
 {
+	const uint32_t size = c->grains * c->units;
+
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < c->n; i++)
 		for (uint32_t j = 0; i + j < c->n && rc == PSR_OK; j++) {
-			const struct piece piece = { i * c->grains, j * c->grains, c->grains };
+			const struct piece piece = { i * size, j * size, size };
 			struct seen seen;
 
 			rc = gather(&seen, c, &piece);
@@ -195,6 +246,12 @@ int cut(const struct cutting *c)
 				rc = put_seen(c, &piece, &seen);
 		}
 	return rc;
+}
+
+/* A flat rectangle around a cell of this size reaches beyond a border by less than the error. */
+static double finest_of(const struct dpoint_cover_options *cover)
+{
+	return fmax(0.25 * (double)cover->error, (double)cover->slack);
 }
 
 double cut_plan(struct cutting *c, unsigned is_open)
@@ -223,5 +280,8 @@ double cut_plan(struct cutting *c, unsigned is_open)
 	c->grains = 1;
 	while (grain > 0 && c->n * c->grains < CUT_MOST_PARTS && most / ((double)c->n * c->grains) > 1.5 * grain)
 		c->grains *= 2;
+	c->units = 1;
+	while (c->view != NULL && units_of(c) < MOST_UNITS && most / units_of(c) > finest_of(c->options->cover))
+		c->units *= 2;
 	return grain > 0 ? fmax(n, ceil(most / (3 * grain))) : n;
 }

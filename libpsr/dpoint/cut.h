@@ -2,17 +2,21 @@
 #ifndef PSR_DPOINT_CUT_H
 #define PSR_DPOINT_CUT_H
 
+#include "bound.h"
 #include "corners.h"
 #include "mesh.h"
 
 #define CUT_MOST_PARTS 4096 /* of a side */
+#define CUT_MOST_PIECES (1u << 22)
 
 struct cutting {
 	struct dpoint_surface *surface;
 	const struct dpoint_mesh_options *options;
 	const struct corner *corner[3];
 	uint32_t triangle, material;
+	struct bound_view *view; /* what the bound of options->cover is looked at through; NULL: it is not asked for */
 	uint32_t n, grains;  /* parts of each side, and how many grains each has: a power of two */
+	uint32_t units;      /* of a grain: likewise */
 	int apex;            /* the corner that is opposite of the longest side */
 	int side;            /* the one that directions follow where any would do */
 };
@@ -22,7 +26,8 @@ struct cutting {
 double cut_plan(struct cutting *c, unsigned is_open);
 
 /* Adds the pieces: parallelograms along the two shorter sides, and triangles along the longest one. Where looks differ
- * they are quarters, and so on down to grains. MEMORY. */
+ * they are quarters, and so on down to grains; where a rectangle of the piece's own point around it is not within the
+ * bound, quarters down to units. MEMORY; LIMIT: more than CUT_MOST_PIECES cells. */
 int cut(const struct cutting *c);
 
 #endif

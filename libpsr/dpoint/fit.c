@@ -4,6 +4,7 @@
 #include <string.h>
 #include "base/array.h"
 #include "base/vec.h"
+#include "bound.h"
 #include "rectangle.h"
 
 #define CHUNK 256    /* candidates */
@@ -293,11 +294,19 @@ static void fit_chunk(int chunk, void *userdata)
 {
 	struct fitting *f = userdata;
 	struct bars bars = { .bar = NULL };
+	struct bound_view view = { .seen = NULL };
+	int rc = PSR_OK;
 
-	for (size_t i = (size_t)chunk * CHUNK; i < f->n && i < (size_t)(chunk + 1) * CHUNK; i++)
+	for (size_t i = (size_t)chunk * CHUNK; i < f->n && i < (size_t)(chunk + 1) * CHUNK; i++) {
+		const struct dpoint_candidate before = f->candidate[i];
+
 		fit(&f->candidate[i], &bars, f);
+		if (f->look.options->error > 0 && rc == PSR_OK)
+			rc = shrink_within(&f->candidate[i], &before, &view, &f->look);
+	}
 	free(bars.bar);
-	if (bars.is_failed)
+	bound_view_fini(&view);
+	if (bars.is_failed || rc != PSR_OK)
 		__atomic_store_n(&f->is_failed, 1, __ATOMIC_RELAXED);
 }
 

@@ -1,12 +1,15 @@
 /* Flat points over cells that no candidate covers. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
+#include "bound.h"
 #include "choice.h"
 #include "rectangle.h"
 
-/* The longest side of a cell, and across it: half of what the cell takes of both, from its middle on. */
-static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell)
+/* The longest side of a cell, and across it: half of what the cell takes of both, from its middle on. is_own: with the
+ * normal of its plane, and not that of the surface. */
+static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell, int is_own)
 {
 	double side[4][3], diagonal[2][3], most = 0;
 	int longest = 0;
@@ -25,8 +28,12 @@ static int local_of_cell(struct dpoint_local *local, double extent[2], const str
 			most = v3d_dot(side[c], side[c]);
 			longest = c;
 		}
-	if (v3d_dot(local->axis[2], local->axis[2]) == 0)
-		v3d_cross(local->axis[2], diagonal[0], diagonal[1]);
+	if (is_own || v3d_dot(local->axis[2], local->axis[2]) == 0) {
+		double normal[3];
+
+		v3d_cross(normal, diagonal[0], diagonal[1]);
+		v3d_scale(local->axis[2], normal, v3d_dot(normal, local->axis[2]) < 0 ? -1 : 1);
+	}
 	if (v3d_normalize(local->axis[2], local->axis[2]) == 0)
 		return 0;
 	v3d_add_scaled(local->axis[0], side[longest], -v3d_dot(side[longest], local->axis[2]), local->axis[2]);
@@ -45,13 +52,14 @@ static int local_of_cell(struct dpoint_local *local, double extent[2], const str
 }
 
 /* Rounding turns the sides of a rectangle by pi / 256, and tilts it by a triangle of normals: 0.015 at most. */
-static int put_patch(struct dpoint_surface *surface, uint32_t at, const struct dpoint_cover_options *options)
+static enum dpoint_made flat_patch(struct dpoint_candidate *out, const struct dpoint_surface *surface, uint32_t at,
+                                   const struct dpoint_cover_options *options, int is_own)
 {
 	const struct dpoint_cell *cell = &surface->cell[at];
 	struct dpoint_local local;
 	double extent[2];
 	struct dpoint_candidate like = { .point.attr = cell->attr, .part = cell->part, .cell = at };
-	int is_good = local_of_cell(&local, extent, cell);
+	int is_good = local_of_cell(&local, extent, cell, is_own);
 
 	for (int k = 0; k < 2; k++) {
 		const double reach = extent[k] + 0.015 * (extent[0] + extent[1]) + 1.01 * options->slack;
@@ -59,32 +67,114 @@ static int put_patch(struct dpoint_surface *surface, uint32_t at, const struct d
 
 		like.delta[k] = dpoint_delta_of_class(class > 0 ? class - 1 : 0);
 	}
-	return dpoint_surface_put(surface, is_good ? &local : NULL, &like);
+	return dpoint_candidate_make(out, is_good ? &local : NULL, &like);
 }
 
-static int patch_below(struct dpoint_surface *surface, const struct tally *tally, size_t i,
-                       const struct dpoint_cover_options *options)
+struct mending {
+	struct dpoint_surface *surface;
+	const struct dpoint_cover_options *options;
+	const struct tally *tally;
+	uint32_t *own;           /* the candidate of each cell, or UINT32_MAX; NULL without a bound */
+	struct bound_view view;
+};
+
+/* Kinds of patches over a cell. A bound has the first one that is within it, or the nearest. */
+enum kind { BENT, FLAT, OWN, N_KINDS };
+
+static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint32_t at, enum kind kind)
 {
-	const struct cell_tree *tree = tally->cover->tree;
+	if (kind != BENT)
+		return flat_patch(out, m->surface, at, m->options, kind == OWN) != DPOINT_BAD;
+	if (m->own[at] == UINT32_MAX)
+		return 0;
+	*out = m->surface->candidate[m->own[at]];
+	return rectangle_around(out->delta, out, &m->surface->cell[at], m->options);
+}
+
+static int put_bounded(struct mending *m, uint32_t at)
+{
+	struct dpoint_candidate patch, *best = NULL;
+	double least = INFINITY;
+
+	for (enum kind kind = BENT; kind < N_KINDS && least > (double)m->options->error; kind++) {
+		struct dpoint_limit limit = { .sine = m->options->sine };
+		float extent[2];
+		double error;
+
+		if (!patch_of(&patch, m, at, kind))
+			continue;
+		memcpy(limit.delta, patch.delta, sizeof limit.delta);
+		dpoint_extent(extent, &patch.point, &limit);
+		error = bound_least(&m->view, &m->surface->facets, &patch.point, extent, (double)m->options->error);
+		if (m->view.is_failed)
+			return PSR_ERR_MEMORY;
+		if (best == NULL && (best = dpoint_surface_candidate(m->surface)) == NULL)
+			return PSR_ERR_MEMORY;
+		if (error < least) {
+			least = error;
+			*best = patch;
+		}
+	}
+	if (best != NULL && least == INFINITY)
+		m->surface->n_candidates--;
+	m->surface->n_bad += best == NULL;
+	return PSR_OK;
+}
+
+static int put_patch(struct mending *m, uint32_t at)
+{
+	struct dpoint_candidate patch, *candidate;
+
+	if (m->own != NULL)
+		return put_bounded(m, at);
+	if (flat_patch(&patch, m->surface, at, m->options, 0) == DPOINT_BAD) {
+		m->surface->n_bad++;
+		return PSR_OK;
+	}
+	candidate = dpoint_surface_candidate(m->surface);
+	if (candidate == NULL)
+		return PSR_ERR_MEMORY;
+	*candidate = patch;
+	return PSR_OK;
+}
+
+static int patch_below(struct mending *m, size_t i)
+{
+	const struct cell_tree *tree = m->tally->cover->tree;
 	uint32_t cell;
 	int rc;
 
-	if (tally->least[i] > 0 || tally->own[i] > 0)
+	if (m->tally->least[i] > 0 || m->tally->own[i] > 0)
 		return PSR_OK;
 	if (cell_node_is_leaf(&tree->node[i])) {
 		cell = tree->order[tree->node[i].begin];
-		return surface->cell[cell].part != DPOINT_BEYOND ? put_patch(surface, cell, options) : PSR_OK;
+		return m->surface->cell[cell].part != DPOINT_BEYOND ? put_patch(m, cell) : PSR_OK;
 	}
-	rc = patch_below(surface, tally, 2 * i + 1, options);
-	return rc == PSR_OK ? patch_below(surface, tally, 2 * i + 2, options) : rc;
+	rc = patch_below(m, 2 * i + 1);
+	return rc == PSR_OK ? patch_below(m, 2 * i + 2) : rc;
+}
+
+static int find_own(struct mending *m)
+{
+	const struct dpoint_surface *surface = m->surface;
+
+	m->own = malloc((surface->n_cells + 1) * sizeof *m->own);
+	if (m->own == NULL)
+		return PSR_ERR_MEMORY;
+	memset(m->own, 0xff, surface->n_cells * sizeof *m->own);
+	for (uint32_t i = 0; i < surface->n_candidates; i++)
+		m->own[surface->candidate[i].cell] = i;
+	return PSR_OK;
 }
 
 int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
                 const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel)
 {
-	const struct dpoint_cover_options any = { options->sine, options->slack, 1, 1, options->is_within_parts, 0, 255 };
+	const struct dpoint_cover_options any = { .sine = options->sine, .slack = options->slack, .angle = 1, .height = 1,
+		                                      .is_within_parts = options->is_within_parts, .looks = 255 };
 	const struct dpoint_work work = { pool, cancel };
 	struct tally tally;
+	struct mending m = { .surface = surface, .options = options, .tally = &tally };
 	int rc;
 
 	if (cover->tree == NULL)
@@ -92,8 +182,12 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	rc = tally_init(&tally, cover);
 	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
 		tally_add(&tally, i, 1);
+	if (rc == PSR_OK && options->error > 0)
+		rc = find_own(&m);
 	if (rc == PSR_OK)
-		rc = patch_below(surface, &tally, 0, options);
+		rc = patch_below(&m, 0);
+	free(m.own);
+	bound_view_fini(&m.view);
 	tally_fini(&tally);
 	return rc == PSR_OK ? cover_candidates(cover, surface, &any, &work) : rc;
 }

@@ -6,7 +6,6 @@
 #include "base/vec.h"
 #include "cut.h"
 
-#define MOST_PIECES (1u << 22)
 #define MOST_GRAINS (1u << 27)
 
 /* A strip beside an open edge, in the triangle's plane, as wide as a cell. */
@@ -47,10 +46,17 @@ static void look_at(struct cutting *c, const struct corners *corners, const stru
 	c->material = mesh->triangle_material[t];
 }
 
+static int is_bounded(const struct dpoint_mesh_options *options)
+{
+	return options->cover != NULL && options->cover->error > 0;
+}
+
 static int refuse_pieces(const struct dpoint_mesh_options *options, struct psr_error *err)
 {
 	return psr_fail(err, PSR_ERR_LIMIT, "the surface would be covered in more than %u pieces of %g, or smaller ones where"
-	                " its colours change; use a lower resolution, or blocks", MOST_PIECES, options->cell);
+	                " its colours change%s; use a lower resolution%s, or blocks", CUT_MOST_PIECES, options->cell,
+	                is_bounded(options) ? ", or the error asks for it" : "",
+	                is_bounded(options) ? ", a greater error" : "");
 }
 
 /* Before anything is cut: what is too much is told at once. */
@@ -69,7 +75,7 @@ static int check(const struct corners *corners, const struct psr_mesh *mesh, con
 		if (c.grains > 1)
 			n_grains += (uint64_t)c.n * c.grains * c.n * c.grains / 2;
 	}
-	if (n_pieces > MOST_PIECES)
+	if (n_pieces > CUT_MOST_PIECES)
 		return refuse_pieces(options, err);
 	if (n_grains > MOST_GRAINS)
 		return psr_fail(err, PSR_ERR_LIMIT, "textures would be looked at in %llu places, of which %u at most are; use a lower"
@@ -77,25 +83,89 @@ static int check(const struct corners *corners, const struct psr_mesh *mesh, con
 	return PSR_OK;
 }
 
+/* Of a triangle with holes, which its material's alpha cuts, the pieces that are there. */
+static int put_pieces_as_facets(struct dpoint_surface *surface, struct dpoint_surface *pieces, const struct cutting *c)
+{
+	struct cutting all = *c;
+	int rc;
+
+	all.surface = pieces;
+	all.view = NULL;
+	cut_plan(&all, 0);
+	pieces->n_cells = pieces->n_candidates = 0;
+	rc = cut(&all);
+	for (size_t i = 0; i < pieces->n_cells && rc == PSR_OK; i++) {
+		const float (*corner)[3] = (const float (*)[3])pieces->cell[i].corner;
+
+		rc = facets_add(&surface->facets, corner[0], corner[1], corner[2]);
+		if (rc == PSR_OK && memcmp(corner[2], corner[3], sizeof corner[2]) != 0)
+			rc = facets_add(&surface->facets, corner[0], corner[2], corner[3]);
+	}
+	return rc;
+}
+
+static int put_facet(struct dpoint_surface *surface, const struct cutting *c)
+{
+	float corner[3][3];
+
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			corner[i][k] = (float)c->corner[i]->at[k];
+	return facets_add(&surface->facets, corner[0], corner[1], corner[2]);
+}
+
+static int put_facets(struct cutting *c, const struct corners *corners, const struct psr_mesh *mesh)
+{
+	struct dpoint_surface pieces;
+	int rc = PSR_OK;
+
+	dpoint_surface_init(&pieces);
+	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
+		look_at(c, corners, mesh, t);
+		if (mesh->material[c->material].alpha != PSR_ALPHA_OPAQUE && c->options->look != NULL)
+			rc = put_pieces_as_facets(c->surface, &pieces, c);
+		else
+			rc = put_facet(c->surface, c);
+	}
+	dpoint_surface_fini(&pieces);
+	return rc == PSR_OK ? facets_sort(&c->surface->facets) : rc;
+}
+
+static int put_cells(struct cutting *c, const struct corners *corners, const struct psr_mesh *mesh,
+                     struct psr_error *err)
+{
+	int rc = PSR_OK;
+
+	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
+		look_at(c, corners, mesh, t);
+		cut_plan(c, corners->is_open[t]);
+		rc = cut(c);
+		for (int i = 0; i < 3 && rc == PSR_OK; i++)
+			if (corners->is_open[t] >> i & 1)
+				rc = put_strip(c, i);
+		if (rc == PSR_ERR_LIMIT || (rc == PSR_OK && c->surface->n_cells > CUT_MOST_PIECES))
+			rc = refuse_pieces(c->options, err);
+	}
+	return rc;
+}
+
 int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *mesh,
                        const struct dpoint_mesh_options *options, struct psr_error *err)
 {
-	struct cutting c = { .surface = surface, .options = options };
+	struct bound_view view = { .seen = NULL };
+	struct cutting c = { .surface = surface, .options = options, .view = is_bounded(options) ? &view : NULL };
 	struct corners corners;
 	int rc = corners_init(&corners, mesh, options);
 
 	if (rc == PSR_OK)
 		rc = check(&corners, mesh, options, err);
-	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
-		look_at(&c, &corners, mesh, t);
-		cut_plan(&c, corners.is_open[t]);
-		rc = cut(&c);
-		for (int i = 0; i < 3 && rc == PSR_OK; i++)
-			if (corners.is_open[t] >> i & 1)
-				rc = put_strip(&c, i);
-		if (rc == PSR_OK && surface->n_cells > MOST_PIECES)
-			rc = refuse_pieces(options, err);
-	}
+	if (rc == PSR_OK)
+		rc = put_facets(&c, &corners, mesh);
+	if (rc == PSR_OK)
+		rc = put_cells(&c, &corners, mesh, err);
+	if (view.is_failed)
+		rc = PSR_ERR_MEMORY;
+	bound_view_fini(&view);
 	surface->n_bad += corners.n_bad;
 	corners_fini(&corners);
 	return rc == PSR_ERR_MEMORY ? psr_fail(err, rc, "no memory for the pieces of the mesh") : rc;

@@ -13,17 +13,20 @@ struct dpoint_mesh_options {
 	 * are cut into quarters until they are of this size; 0: not at all. NULL: as if all were 0. */
 	const double *grain_of;
 	int looks;
+	/* With an error: cells are cut further until rectangles around them can be within it. NULL, or 0: they are not. */
+	const struct dpoint_cover_options *cover;
 	/* Tells the attributes of the place v0 + u (v1 - v0) + v (v2 - v0) of a triangle, without a normal. Returns 0 where
 	 * there is no surface: then there is no cell. NULL: attributes are 0. */
 	int (*look)(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr);
 	void *userdata;
 };
 
-/* Adds a candidate and a cell for each piece of a triangle, with the shape of its corners' curvatures between them.
+/* Adds facets, those of triangles, or of the cells that are there where a material has alpha; and a candidate and a cell
+ * for each piece of a triangle, with the shape of its corners' curvatures between them.
  * Corners that share place and normal are one: so creases, where a mesh has several normals at a place or none, and
  * borders part the surface, and a strip beyond them keeps rectangles from reaching over. Parts are materials. Corners
  * without curvatures (of slivers) count as bad, and flat. MEMORY; LIMIT: more than 2^22 pieces, 2^27 looks, or 4096
- * pieces along a side; of these only pieces that colours ask for are counted late, as they come. */
+ * pieces along a side; of these only pieces that colours or an error ask for are counted late, as they come. */
 int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *mesh,
                        const struct dpoint_mesh_options *options, struct psr_error *err);
 

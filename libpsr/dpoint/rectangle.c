@@ -52,6 +52,39 @@ void rectangle_shorten(struct rectangle *r, float slack)
 	}
 }
 
+/* e sqrt(1 - (lambda e)^2) = most has its lesser root at (lambda e)^2 = (1 - sqrt(1 - (2 lambda most)^2)) / 2, here
+ * without a difference. */
+int rectangle_around(float delta[2], const struct dpoint_candidate *c, const struct dpoint_cell *cell,
+                     const struct dpoint_cover_options *options)
+{
+	float p[3], most[2] = { 0, 0 };
+	struct rectangle r;
+
+	rectangle_of(&r, c, options);
+	for (int i = 0; i < 4; i++) {
+		rectangle_sees(p, &r, cell->corner[i]);
+		for (int k = 0; k < 2; k++)
+			most[k] = fmaxf(most[k], fabsf(p[k]));
+	}
+	for (int k = 0; k < 2; k++) {
+		const float lambda = fabsf(r.lambda_u * (k == 0 ? 1 : r.rho)), m = most[k] + 1.01f * options->slack;
+		const float inside = 1 - 4 * lambda * lambda * m * m;
+		float extent;
+		unsigned class;
+
+		if (!(inside >= 0))
+			return 0;
+		extent = m * sqrtf(2 / (1 + sqrtf(inside))) * 1.0001f;
+		class = dpoint_delta_class(extent);
+		if (dpoint_delta_of_class(class) < extent && class-- == 0)
+			return 0;
+		if (extent * lambda > options->sine)
+			return 0;
+		delta[k] = dpoint_delta_of_class(class);
+	}
+	return 1;
+}
+
 void rectangle_sees(float at[3], const struct rectangle *r, const float p[3])
 {
 	float away[3];

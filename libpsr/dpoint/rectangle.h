@@ -28,6 +28,11 @@ void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const s
 /* Shortens the extents to what may count as covered (struct dpoint_cover). */
 void rectangle_shorten(struct rectangle *r, float slack);
 
+/* Finds the least delta of a class whose rectangle, shortened, is over all corners of a cell. Returns 0 if there is
+ * none. */
+int rectangle_around(float delta[2], const struct dpoint_candidate *c, const struct dpoint_cell *cell,
+                     const struct dpoint_cover_options *options);
+
 /* A place in the frame of the rectangle. */
 void rectangle_sees(float at[3], const struct rectangle *r, const float p[3]);
 
@@ -56,6 +61,13 @@ struct dpoint_work {
 /* dpoint_fit() of the candidates from `first` on. */
 int fit_candidates(struct dpoint_surface *surface, const struct cell_tree *tree, size_t first,
                    const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
+/* Shortens delta, by classes, until the quadric over the rectangle is within options->error of the surface's facets. A
+ * rectangle that then does not cover its own cell becomes that of `before` around the cell, if that is within the error.
+ * MEMORY. */
+struct bound_view;
+int shrink_within(struct dpoint_candidate *c, const struct dpoint_candidate *before, struct bound_view *view,
+                  const struct looking *l);
 
 /* Makes the lists of the surface's candidates that the cover lacks: its last ones. */
 int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *surface,

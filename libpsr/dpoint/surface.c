@@ -13,6 +13,7 @@ void dpoint_surface_fini(struct dpoint_surface *surface)
 {
 	free(surface->cell);
 	free(surface->candidate);
+	facets_fini(&surface->facets);
 	memset(surface, 0, sizeof *surface);
 }
 
@@ -31,14 +32,29 @@ struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface
 	return &surface->candidate[surface->n_candidates++];
 }
 
+enum dpoint_made dpoint_candidate_make(struct dpoint_candidate *out, const struct dpoint_local *local,
+                                       const struct dpoint_candidate *like)
+{
+	static const struct dpoint_box box = { { 0, 0, 0 }, { 1, 1, 1 } };
+	struct dpoint_word word;
+	struct dpoint point;
+	const enum dpoint_made made = local != NULL ? dpoint_make(&point, local) : DPOINT_BAD;
+
+	if (made == DPOINT_BAD)
+		return made;
+	point.attr = like->point.attr;
+	*out = *like;
+	dpoint_pack(&word, &point, &box);
+	dpoint_unpack(&out->point, &word, &box);
+	memcpy(out->point.at, point.at, sizeof point.at);
+	return made;
+}
+
 int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local,
                        const struct dpoint_candidate *like)
 {
-	static const struct dpoint_box box = { { 0, 0, 0 }, { 1, 1, 1 } };
-	struct dpoint_candidate *candidate;
-	struct dpoint_word word;
-	struct dpoint point;
-	enum dpoint_made made = local != NULL ? dpoint_make(&point, local) : DPOINT_BAD;
+	struct dpoint_candidate made_one, *candidate;
+	const enum dpoint_made made = dpoint_candidate_make(&made_one, local, like);
 
 	surface->n_bad += made == DPOINT_BAD;
 	surface->n_clamped += made == DPOINT_CLAMPED;
@@ -47,10 +63,6 @@ int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local
 	candidate = dpoint_surface_candidate(surface);
 	if (candidate == NULL)
 		return PSR_ERR_MEMORY;
-	point.attr = like->point.attr;
-	*candidate = *like;
-	dpoint_pack(&word, &point, &box);
-	dpoint_unpack(&candidate->point, &word, &box);
-	memcpy(candidate->point.at, point.at, sizeof point.at);
+	*candidate = made_one;
 	return PSR_OK;
 }

@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include "base/pool.h"
 #include "dpoint.h"
+#include "facets.h"
 #include "psr/error.h"
 
 /* A piece of the surface: a convex quadrilateral, or a triangle, whose last corners are one. */
@@ -32,6 +33,7 @@ struct dpoint_surface {
 	struct dpoint_candidate *candidate;
 	size_t n_cells, n_candidates, cells_room, candidates_room;
 	uint64_t n_bad, n_clamped;  /* candidates that were left out; whose curvature was brought to the bound */
+	struct facets facets;       /* of a mesh; of other sources there are none */
 };
 
 void dpoint_surface_init(struct dpoint_surface *surface); /* empty */
@@ -41,8 +43,12 @@ void dpoint_surface_fini(struct dpoint_surface *surface);
 struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface);
 struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface);
 
-/* Adds the candidate of a local shape, rounded to what a word holds but for its place; counts what is left out. NULL:
- * there is no shape. like: its delta, part, cell and attributes. MEMORY. */
+/* Makes the candidate of a local shape, rounded to what a word holds but for its place. NULL: there is no shape, which
+ * is DPOINT_BAD. like: its delta, part, cell and attributes. */
+enum dpoint_made dpoint_candidate_make(struct dpoint_candidate *out, const struct dpoint_local *local,
+                                       const struct dpoint_candidate *like);
+
+/* Makes a candidate, and adds it; counts what is left out. MEMORY. */
 int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local,
                        const struct dpoint_candidate *like);
 
@@ -57,6 +63,8 @@ struct dpoint_cover_options {
 	int is_within_parts; /* points cover cells of their own part alone, as in [K] 6 */
 	float overhang;    /* dpoint_fit(): how far a rectangle may reach over what it does not suit */
 	int looks;         /* a cell may differ from the point by so many 255ths of a channel (look.h), 0..255 */
+	float error;       /* above 0: dpoint_fit() and dpoint_mend() keep the quadric over the rectangle within this distance
+	                    * of the surface's facets, as bound.h proves it, before places are packed */
 };
 
 /* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along
@@ -132,5 +140,14 @@ struct dpoint_errors {
 };
 void dpoint_measure(struct dpoint_errors *errors, const struct dpoint_surface *surface,
                     const struct dpoint_cover *cover, const struct dpoint_choice *choice);
+
+/* How far the kept points' quadrics are from the surface's facets, over all of their rectangles. */
+struct dpoint_bounds {
+	size_t n_over;     /* points for which options->error is not shown to hold */
+	double worst;      /* no place is further off, before packing; at most 1/16 and 1e-5 too great; 0 without facets */
+};
+int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surface *surface,
+                          const struct dpoint_choice *choice, const struct dpoint_cover_options *options,
+                          struct psr_pool *pool); /* MEMORY */
 
 #endif

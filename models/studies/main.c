@@ -86,6 +86,9 @@ static const struct study_kind tables[] = {
 	{ "dpoint", "[K] table 1", "differential points: simplification", table_dpoint, "teapot",
 	  "kB: [K]'s points have 62 bytes, ours 16, and fitted ones are in groups. Errors, in degrees and radii\n"
 	  "of the model, are those of each kept point at each place that it covers; holes: what no point covers.", NULL },
+	{ "dpoint-error", "[K] 7", "differential points within an error", table_dpoint_error, "teapot,top",
+	  "An error is what psr-model build --error asks for, in pixels of the resolution. off by: no drawn place is further\n"
+	  "from the mesh, as is proven; over: points that are further off than asked.", NULL },
 	{ "dpoint-frames", "[K] 6", "differential points beside blocks, at magnifications", table_dpoint_frames,
 	  "teapot,toybird",
 	  "Pictures of 800x600 with one light, roughness 0.25. A size is how many pixels of the picture are one that the\n"

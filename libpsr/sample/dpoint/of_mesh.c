@@ -5,6 +5,7 @@
 #include <string.h>
 #include "base/clock.h"
 #include "base/vec.h"
+#include "dpoint/bound.h"
 #include "dpoint/mesh.h"
 #include "model/blocks.h"
 #include "sample/octree/of_mesh.h"
@@ -46,6 +47,14 @@ static int check_options(const struct dpoint_build_options *o, struct psr_error 
 	    || !(o->degrees >= 0.1 && o->degrees <= 90) || !(o->height > 0) || !(o->piece > 0))
 		return psr_fail(err, PSR_ERR_ARG, "options of differential points are out of range: epsilon %g, delta %g, %g degrees",
 		                o->epsilon, o->delta, o->degrees);
+	if (!(o->error >= 0 && o->error <= o->resolution))
+		return psr_fail(err, PSR_ERR_ARG, "an error of %g pixels is not within 0 to the resolution, %u", o->error,
+		                o->resolution);
+	/* As much again is left for what packing does not move. */
+	if (o->error > 0 && !(o->error >= BOUND_PACKING * o->resolution))
+		return psr_fail(err, PSR_ERR_ARG, "an error of %g pixels at a resolution of %u is below what the file's points hold; ask"
+		                " for %.2g or more, or a lower resolution", o->error, o->resolution,
+		                1.01 * BOUND_PACKING * o->resolution);
 	return PSR_OK;
 }
 
@@ -94,12 +103,49 @@ static void find_grains(struct building *b)
 		b->grain[m] = b->look.is_plain[m] && b->mesh->color == NULL ? 0 : 2.0 / b->options->resolution;
 }
 
+static double pixel_of(const struct dpoint_build_options *o)
+{
+	return 2.0 / o->resolution;
+}
+
+/* A side of a rectangle at `sine` of a radius R of curvature is s R long, and lambda is off by 2^(1/12) - 1 = 5.9 %, so
+ * that the quadric ends 0.059 s^2 R / 2 off there, and in a corner twice as much: by the error where R is a quarter of
+ * the model's. Where it is more, rectangles are shortened one by one; where less, they could be longer. */
+static float sine_of(const struct dpoint_build_options *o, double error)
+{
+	return fminf(dpoint_sine(o->epsilon), (float)sqrt(error / (0.059 * 0.25)));
+}
+
+static struct dpoint_cover_options cover_options_of(const struct dpoint_build_options *o)
+{
+	struct dpoint_cover_options cover = {
+		.sine = dpoint_sine(o->epsilon), .slack = SLACK, .angle = (float)(o->degrees * PSR_DEGREE),
+		.height = (float)o->height, .overhang = OVERHANG, .looks = LOOKS,
+	};
+
+	if (o->error > 0) {
+		cover.error = (float)(o->error * pixel_of(o) - BOUND_PACKING);
+		cover.height = fminf(cover.height, cover.error);
+		cover.overhang = fminf(OVERHANG, 0.5f * cover.error);
+		cover.sine = sine_of(o, (double)cover.error);
+	}
+	return cover;
+}
+
+/* A normal is packed within 0.23 degrees, so a flat rectangle of 250 errors ends one error off. */
+static double delta_of(const struct dpoint_build_options *o)
+{
+	return o->error > 0 ? fmin(o->delta, 250 * o->error * pixel_of(o)) : o->delta;
+}
+
 static int choose(struct building *b, struct dpoint_set *set, struct dpoint_build_report *report)
 {
 	const struct dpoint_build_options *o = b->options;
+	const struct dpoint_cover_options cover = cover_options_of(o);
 	const struct dpoint_mesh_options mesh = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = o->piece, .delta = dpoint_delta_of_class(dpoint_delta_class((float)o->delta)), .grain_of = b->grain,
+		.cell = o->piece, .delta = dpoint_delta_of_class(dpoint_delta_class((float)delta_of(o))), .grain_of = b->grain,
+		.cover = &cover,
 		.looks = LOOKS, .look = look_at, .userdata = b,
 	};
 	int rc;
@@ -118,23 +164,25 @@ static int choose(struct building *b, struct dpoint_set *set, struct dpoint_buil
 int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, struct dpoint_surface *surface,
                   const uint8_t *two_sided, const struct dpoint_build_options *options)
 {
-	const struct dpoint_cover_options cover_options = {
-		.sine = dpoint_sine(options->epsilon), .slack = SLACK, .angle = (float)(options->degrees * PSR_DEGREE),
-		.height = (float)options->height, .overhang = OVERHANG, .looks = LOOKS,
-	};
+	const struct dpoint_cover_options cover_options = cover_options_of(options);
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
 	struct dpoint_errors errors;
+	struct dpoint_bounds bounds;
 	int rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);
 
 	if (rc == PSR_OK)
 		rc = dpoint_set_make(set, &(struct dpoint_grouping){ surface, &choice, cover_options.sine, two_sided });
+	if (rc == PSR_OK)
+		rc = dpoint_bounds_measure(&bounds, surface, &choice, &cover_options, options->pool);
 	if (rc == PSR_OK) {
 		dpoint_measure(&errors, surface, &cover, &choice);
-		/* Measured in the middles of pieces, of which corners are further off, before places are rounded. */
-		set->height = (float)fmin(2 * errors.height_worst + (double)SLACK, 2);
-		*report = (struct dpoint_build_report){ surface->n_candidates, choice.n_kept, choice.n_holes, surface->n_bad,
-			                                    errors.normal_rms, errors.normal_worst, errors.height_worst, 0 };
+		set->height = (float)fmin(bounds.worst + BOUND_PACKING, 2);
+		*report = (struct dpoint_build_report){ .n_candidates = surface->n_candidates, .n_kept = choice.n_kept,
+			                                    .n_open = choice.n_holes, .n_bad = surface->n_bad,
+			                                    .normal_rms = errors.normal_rms, .normal_worst = errors.normal_worst,
+			                                    .height_worst = errors.height_worst, .n_over = bounds.n_over,
+			                                    .off_worst = (double)set->height / pixel_of(options) };
 	}
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);

@@ -13,6 +13,7 @@ int study_dpoint_prune(struct dpoint_choice *choice, const struct dpoint_surface
 struct study;
 int table_dpoint(struct study *study);
 int table_dpoint_meshes(struct study *study);
+int table_dpoint_error(struct study *study);
 int table_dpoint_frames(struct study *study);
 
 #endif

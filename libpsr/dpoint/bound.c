@@ -1,0 +1,410 @@
+/* A convex part of the quadric is within the error of a facet if its corners are, less what the quadric departs from
+ * their hull, as the distance from a convex set is a convex function: (u, v) = sum of l_i (u_i, v_i) of the corners is
+ * off from the same mean of their places by w = sum of l_i q_i - q = (a Var(u) + b Var(v)) / 2, and a variance is at
+ * most a quarter of the squared width. Half of the greatest departure, with its sign, moves the corners, so that the
+ * other half is left. A part that no single facet suffices for is cut along the facet's sides, or in halves. */
+#include "bound.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/array.h"
+#include "base/vec.h"
+#include "psr/error.h"
+
+#define MOST_CORNERS 16
+#define MOST_DEPTH 64
+#define FEW 8          /* facets that are tried one by one */
+#define MANY 24        /* which halves are first to have fewer of */
+#define FINEST 32      /* of an error: smaller parts are not cut */
+#define SLIVER 1e-7    /* of a facet's altitude to its side: it is its sides alone */
+
+struct bound_seen {
+	double corner[3][3], side[3][3], per_side[3]; /* side i is from corner i to the next; 1 / its square, or 0 */
+	double normal[3], per_normal;                 /* likewise; 0 for slivers */
+	double low[3], high[3];
+};
+
+/* A convex part of the rectangle. */
+struct part {
+	double corner[MOST_CORNERS][2];
+	int n;
+};
+
+struct bounding {
+	struct bound_view *view;
+	double error;
+	double *place;
+};
+
+/* ---- facets in the frame ---- */
+
+static void prepare(struct bound_seen *seen)
+{
+	double most = 0, square;
+
+	for (int i = 0; i < 3; i++) {
+		v3d_sub(seen->side[i], seen->corner[(i + 1) % 3], seen->corner[i]);
+		square = v3d_dot(seen->side[i], seen->side[i]);
+		most = fmax(most, square);
+		seen->per_side[i] = square > 0 ? 1 / square : 0;
+		seen->low[i] = fmin(fmin(seen->corner[0][i], seen->corner[1][i]), seen->corner[2][i]);
+		seen->high[i] = fmax(fmax(seen->corner[0][i], seen->corner[1][i]), seen->corner[2][i]);
+	}
+	v3d_cross(seen->normal, seen->side[0], seen->side[1]);
+	square = v3d_dot(seen->normal, seen->normal);
+	seen->per_normal = square > SLIVER * SLIVER * most * most ? 1 / square : 0;
+}
+
+/* The least and greatest height of the quadric over a box. */
+static void rise(double w[2], const struct bound_view *view, const double low[2], const double high[2])
+{
+	const double lambda[2] = { view->a, view->b };
+
+	w[0] = w[1] = 0;
+	for (int k = 0; k < 2; k++) {
+		const double x = 0.5 * lambda[k] * low[k] * low[k], y = 0.5 * lambda[k] * high[k] * high[k];
+		const double middle = low[k] < 0 && high[k] > 0 ? 0 : x;
+
+		w[0] += fmin(fmin(x, y), middle);
+		w[1] += fmax(fmax(x, y), middle);
+	}
+}
+
+static int is_apart(const struct bound_seen *seen, const double low[3], const double high[3], double far)
+{
+	for (int k = 0; k < 3; k++)
+		if (!(seen->low[k] <= high[k] + far && seen->high[k] >= low[k] - far))
+			return 1;
+	return 0;
+}
+
+struct looking_at {
+	struct bound_view *view;
+	double low[3], high[3];
+};
+
+static int take(const struct facet *facet, size_t n, void *userdata)
+{
+	const struct looking_at *l = userdata;
+	struct bound_view *view = l->view;
+
+	for (size_t f = 0; f < n; f++) {
+		struct bound_seen *seen;
+
+		if (!ARRAY_ROOM(view->seen, view->n_seen, view->seen_room))
+			return PSR_ERR_MEMORY;
+		seen = &view->seen[view->n_seen];
+		for (int i = 0; i < 3; i++) {
+			double away[3];
+
+			for (int k = 0; k < 3; k++)
+				away[k] = facet[f].corner[i][k] - view->at[k];
+			m3d_apply(seen->corner[i], (const double (*)[3])view->axis, away);
+		}
+		prepare(seen);
+		view->n_seen += !is_apart(seen, l->low, l->high, view->far);
+	}
+	return 0;
+}
+
+int bound_look(struct bound_view *view, const struct facets *facets, const struct dpoint *point, const float extent[2],
+               double far)
+{
+	struct looking_at l = { view, { -extent[0], -extent[1], 0 }, { extent[0], extent[1], 0 } };
+	struct facet_box box;
+	double w[2];
+
+	view->n_seen = 0;
+	view->far = far;
+	view->a = point->lambda_u;
+	view->b = (double)point->lambda_u * point->rho;
+	for (int k = 0; k < 3; k++) {
+		view->at[k] = point->at[k];
+		view->axis[0][k] = point->u[k];
+		view->axis[2][k] = point->normal[k];
+	}
+	v3d_cross(view->axis[1], view->axis[2], view->axis[0]);
+	rise(w, view, l.low, l.high);
+	l.low[2] = w[0];
+	l.high[2] = w[1];
+	for (int k = 0; k < 3; k++) {
+		const double middle = view->at[k] + 0.5 * (w[0] + w[1]) * view->axis[2][k];
+		const double reach = extent[0] * fabs(view->axis[0][k]) + extent[1] * fabs(view->axis[1][k]) +
+		                     0.5 * (w[1] - w[0]) * fabs(view->axis[2][k]) + far + 1e-6;
+
+		box.low[k] = (float)(middle - reach);
+		box.high[k] = (float)(middle + reach);
+	}
+	view->is_failed = facets_search(facets, &box, take, &l) != 0;
+	return view->is_failed ? PSR_ERR_MEMORY : PSR_OK;
+}
+
+void bound_view_fini(struct bound_view *view)
+{
+	free(view->seen);
+	free(view->list);
+	memset(view, 0, sizeof *view);
+}
+
+/* ---- distances ---- */
+
+static double side_distance2(const struct bound_seen *seen, int i, const double away[3])
+{
+	const double t = fmin(fmax(v3d_dot(away, seen->side[i]) * seen->per_side[i], 0), 1);
+	double left[3];
+
+	v3d_add_scaled(left, away, -t, seen->side[i]);
+	return v3d_dot(left, left);
+}
+
+/* The nearest side is one that the place is beyond. */
+static double distance2(const struct bound_seen *seen, const double p[3])
+{
+	double least = INFINITY, away[3], across[3];
+
+	for (int i = 0; i < 3; i++) {
+		v3d_sub(away, p, seen->corner[i]);
+		v3d_cross(across, seen->side[i], away);
+		if (seen->per_normal == 0 || v3d_dot(across, seen->normal) < 0)
+			least = fmin(least, side_distance2(seen, i, away));
+	}
+	if (least < INFINITY)
+		return least;
+	v3d_sub(away, p, seen->corner[0]);
+	return v3d_dot(away, seen->normal) * v3d_dot(away, seen->normal) * seen->per_normal;
+}
+
+static void place_at(double p[3], const struct bound_view *view, double u, double v)
+{
+	v3d_set(p, u, v, 0.5 * (view->a * u * u + view->b * v * v));
+}
+
+/* The facet that is nearest to the place, of those within the error. */
+static const struct bound_seen *nearest(const struct bounding *b, const double p[3], size_t begin, size_t end)
+{
+	const struct bound_seen *best = NULL;
+	double least = b->error * b->error;
+
+	for (size_t i = begin; i < end; i++) {
+		const struct bound_seen *seen = &b->view->seen[b->view->list[i]];
+		double d;
+
+		if (is_apart(seen, p, p, b->error))
+			continue;
+		d = distance2(seen, p);
+		if (d <= least) {
+			least = d;
+			best = seen;
+		}
+	}
+	return best;
+}
+
+static int suffices(const struct bounding *b, const struct bound_seen *seen, const struct part *part, double departure,
+                    double shift)
+{
+	const double most = b->error - departure;
+
+	for (int i = 0; i < part->n; i++) {
+		double p[3];
+
+		place_at(p, b->view, part->corner[i][0], part->corner[i][1]);
+		p[2] += shift;
+		if (!(distance2(seen, p) <= most * most))
+			return 0;
+	}
+	return 1;
+}
+
+/* ---- parts ---- */
+
+static void put(struct part *part, const double at[2])
+{
+	part->corner[part->n][0] = at[0];
+	part->corner[part->n++][1] = at[1];
+}
+
+/* Cuts where line[0] u + line[1] v + line[2] is 0. Returns 0 where less than `least` of the part is on either side. */
+static int cut_part(struct part side[2], const struct part *part, const double line[3], double least)
+{
+	double value[MOST_CORNERS], low = 0, high = 0;
+
+	for (int i = 0; i < part->n; i++) {
+		value[i] = line[0] * part->corner[i][0] + line[1] * part->corner[i][1] + line[2];
+		low = fmin(low, value[i]);
+		high = fmax(high, value[i]);
+	}
+	side[0].n = side[1].n = 0;
+	if (-low <= least || high <= least)
+		return 0;
+	for (int i = 0; i < part->n; i++) {
+		const int next = (i + 1) % part->n;
+
+		if (value[i] >= 0)
+			put(&side[0], part->corner[i]);
+		if (value[i] <= 0)
+			put(&side[1], part->corner[i]);
+		if ((value[i] < 0) != (value[next] < 0) && value[i] != 0 && value[next] != 0) {
+			const double t = value[i] / (value[i] - value[next]);
+			const double at[2] = { part->corner[i][0] + t * (part->corner[next][0] - part->corner[i][0]),
+				                   part->corner[i][1] + t * (part->corner[next][1] - part->corner[i][1]) };
+
+			put(&side[0], at);
+			put(&side[1], at);
+		}
+	}
+	return 1;
+}
+
+/* Along a side of the facet, as the rectangle sees it. */
+static int cut_along(struct part side[2], const struct part *part, const struct bound_seen *seen, double least)
+{
+	for (int i = 0; i < 3; i++) {
+		const double u = seen->side[i][0], v = seen->side[i][1], length = sqrt(u * u + v * v);
+		double line[3];
+
+		if (!(length > 1e-9))
+			continue;
+		line[0] = -v / length;
+		line[1] = u / length;
+		line[2] = -(line[0] * seen->corner[i][0] + line[1] * seen->corner[i][1]);
+		if (cut_part(side, part, line, least))
+			return 1;
+	}
+	return 0;
+}
+
+/* Adds the listed facets that are within the error of the box to the list. */
+static int filter(const struct bounding *b, size_t begin, size_t end, const double low[3], const double high[3])
+{
+	struct bound_view *view = b->view;
+
+	for (size_t i = begin; i < end; i++) {
+		if (is_apart(&view->seen[view->list[i]], low, high, b->error))
+			continue;
+		if (!ARRAY_ROOM(view->list, view->n_list, view->list_room)) {
+			view->is_failed = 1;
+			return 0;
+		}
+		view->list[view->n_list++] = view->list[i];
+	}
+	return view->n_list > end;
+}
+
+static void box_of(double low[3], double high[3], const struct bound_view *view, const struct part *part)
+{
+	double w[2];
+
+	for (int k = 0; k < 2; k++) {
+		low[k] = high[k] = part->corner[0][k];
+		for (int i = 1; i < part->n; i++) {
+			low[k] = fmin(low[k], part->corner[i][k]);
+			high[k] = fmax(high[k], part->corner[i][k]);
+		}
+	}
+	rise(w, view, low, high);
+	low[2] = w[0];
+	high[2] = w[1];
+}
+
+static void middle_of(double at[2], const struct part *part)
+{
+	at[0] = at[1] = 0;
+	for (int i = 0; i < part->n; i++)
+		for (int k = 0; k < 2; k++)
+			at[k] += part->corner[i][k] / part->n;
+}
+
+/* Facets are those of the list from `begin` on. */
+static int part_holds(const struct bounding *b, const struct part *part, size_t begin, int depth)
+{
+	struct bound_view *view = b->view;
+	const size_t end = view->n_list;
+	double low[3], high[3], middle[3], bend[2], size;
+	const struct bound_seen *seen = NULL;
+	struct part side[2];
+	size_t n, top;
+	int is_whole, is_crowded, axis, holds;
+
+	box_of(low, high, view, part);
+	middle_of(b->place, part);
+	place_at(middle, view, b->place[0], b->place[1]);
+	for (int k = 0; k < 2; k++)
+		bend[k] = (k == 0 ? view->a : view->b) * (high[k] - low[k]) * (high[k] - low[k]) / 16;
+	size = fmax(high[0] - low[0], high[1] - low[1]);
+	axis = high[1] - low[1] > high[0] - low[0];
+	if (!filter(b, begin, end, low, high))
+		return 0;
+	n = view->n_list - end;
+	is_whole = fabs(bend[0]) + fabs(bend[1]) <= b->error / 4;
+	if (!is_whole)
+		axis = fabs(bend[1]) > fabs(bend[0]);
+	is_crowded = n > MANY && 4 * n < 3 * (end - begin) && size > b->error / 2;
+	if (is_whole && !is_crowded) {
+		seen = nearest(b, middle, end, view->n_list);
+		if (seen == NULL)
+			return 0;
+		if (suffices(b, seen, part, fabs(bend[0]) + fabs(bend[1]), -bend[0] - bend[1]))
+			return 1;
+		for (size_t i = end; i < view->n_list && n <= FEW; i++)
+			if (suffices(b, &view->seen[view->list[i]], part, fabs(bend[0]) + fabs(bend[1]), -bend[0] - bend[1]))
+				return 1;
+	}
+	if (size <= b->error / FINEST || depth >= MOST_DEPTH)
+		return 0;
+	if (seen == NULL || part->n > MOST_CORNERS - 4 || !cut_along(side, part, seen, fmin(size, b->error) / 16)) {
+		double line[3] = { axis == 0, axis == 1, -0.5 * (low[axis] + high[axis]) };
+
+		if (!cut_part(side, part, line, 0))
+			return 0;
+	}
+	top = view->n_list;
+	holds = part_holds(b, &side[0], end, depth + 1);
+	view->n_list = top;
+	return holds && part_holds(b, &side[1], end, depth + 1);
+}
+
+/* What fails mostly does so at a corner, or in the middle of a side. */
+static int outline_holds(const struct bounding *b, const float extent[2])
+{
+	for (int i = 0; i < 9; i++) {
+		double p[3];
+
+		place_at(p, b->view, (i % 3 - 1) * (double)extent[0], (i / 3 - 1) * (double)extent[1]);
+		memcpy(b->place, p, 2 * sizeof *p);
+		if (nearest(b, p, 0, b->view->n_list) == NULL)
+			return 0;
+	}
+	return 1;
+}
+
+int bound_holds(struct bound_view *view, const float extent[2], double error, double place[2])
+{
+	const double u = extent[0], v = extent[1];
+	const struct part all = { { { -u, -v }, { u, -v }, { u, v }, { -u, v } }, 4 };
+	double somewhere[2];
+	const struct bounding b = { view, error, place != NULL ? place : somewhere };
+
+	view->n_list = 0;
+	for (size_t i = 0; i < view->n_seen; i++) {
+		if (!ARRAY_ROOM(view->list, i, view->list_room)) {
+			view->is_failed = 1;
+			return 0;
+		}
+		view->list[view->n_list++] = (uint32_t)i;
+	}
+	return outline_holds(&b, extent) && part_holds(&b, &all, 0, 0) && !view->is_failed;
+}
+
+double bound_least(struct bound_view *view, const struct facets *facets, const struct dpoint *point,
+                   const float extent[2], double least)
+{
+	for (double error = least; error < 8; error *= 2) {
+		if (bound_look(view, facets, point, extent, error) != PSR_OK)
+			return INFINITY;
+		if (bound_holds(view, extent, error, NULL))
+			return error;
+	}
+	return INFINITY;
+}

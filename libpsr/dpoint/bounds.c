@@ -1,0 +1,82 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "bound.h"
+#include "surface.h"
+
+#define CHUNK 256     /* candidates */
+#define LEAST 1e-5
+#define STEPS 4       /* of halving a factor of two */
+
+struct measuring {
+	const struct dpoint_surface *surface;
+	const struct dpoint_choice *choice;
+	const struct dpoint_cover_options *options;
+	struct dpoint_bounds *of_chunk;
+	int is_failed;
+};
+
+/* Raises the worst of its chunk, if the candidate is further off. */
+static void look(struct dpoint_bounds *bounds, struct bound_view *view, const struct measuring *m,
+                 const struct dpoint_candidate *c)
+{
+	const struct dpoint_limit limit = { m->options->sine, { c->delta[0], c->delta[1] } };
+	const struct facets *facets = &m->surface->facets;
+	const double before = bounds->worst, asked = (double)m->options->error;
+	double low, high;
+	float extent[2];
+	int is_over;
+
+	dpoint_extent(extent, &c->point, &limit);
+	high = bound_least(view, facets, &c->point, extent, before);
+	low = fmax(high / 2, before);
+	for (int i = 0; i < STEPS && high > before; i++) {
+		const double middle = 0.5 * (low + high);
+
+		if (bound_holds(view, extent, middle, NULL))
+			high = middle;
+		else
+			low = middle;
+	}
+	is_over = asked > 0 && high > asked && bound_least(view, facets, &c->point, extent, asked) > asked;
+	bounds->n_over += is_over;
+	bounds->worst = asked > 0 && !is_over ? fmax(before, fmin(high, asked)) : high;
+}
+
+static void measure_chunk(int chunk, void *userdata)
+{
+	struct measuring *m = userdata;
+	struct dpoint_bounds *bounds = &m->of_chunk[chunk];
+	struct bound_view view = { .seen = NULL };
+	const size_t begin = (size_t)chunk * CHUNK, n = m->surface->n_candidates;
+
+	*bounds = (struct dpoint_bounds){ 0, LEAST };
+	for (size_t i = begin; i < begin + CHUNK && i < n && !view.is_failed; i++)
+		if (m->choice->is_kept[i])
+			look(bounds, &view, m, &m->surface->candidate[i]);
+	if (view.is_failed)
+		__atomic_store_n(&m->is_failed, 1, __ATOMIC_RELAXED);
+	bound_view_fini(&view);
+}
+
+int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surface *surface,
+                          const struct dpoint_choice *choice, const struct dpoint_cover_options *options,
+                          struct psr_pool *pool)
+{
+	const int n_chunks = (int)((surface->n_candidates + CHUNK - 1) / CHUNK);
+	struct measuring m = { .surface = surface, .choice = choice, .options = options };
+
+	*bounds = (struct dpoint_bounds){ 0, 0 };
+	if (surface->facets.n == 0)
+		return PSR_OK;
+	m.of_chunk = calloc((size_t)n_chunks + 1, sizeof *m.of_chunk);
+	if (m.of_chunk == NULL)
+		return PSR_ERR_MEMORY;
+	psr_pool_for(pool, n_chunks, measure_chunk, &m);
+	for (int i = 0; i < n_chunks; i++) {
+		bounds->n_over += m.of_chunk[i].n_over;
+		bounds->worst = fmax(bounds->worst, m.of_chunk[i].worst);
+	}
+	free(m.of_chunk);
+	return m.is_failed ? PSR_ERR_MEMORY : PSR_OK;
+}
