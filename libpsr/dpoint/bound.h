@@ -5,8 +5,8 @@
 #include "dpoint.h"
 #include "facets.h"
 
-/* What packing in a group's box adds to the distance of a drawn place from the surface, inner units. dpoint_pack() moves
- * a candidate's place by half a step of a box of DPOINT_MOST_BOX and 2^-22 of its coordinates on each axis, so by
+/* What packing in a group's box adds to the distance of a drawn place from the surface, inner units. dpoint_pack()
+ * moves a candidate's place by half a step of a box of DPOINT_MOST_BOX and 2^-22 of its coordinates on each axis, so by
  * sqrt(3) (0.16 / 4095 / 2 + 2^-22 1.1) = 3.43e-5 in all, and changes nothing else: candidates are as they come from a
  * word. Facets' corners are rounded to floats, 1e-7 in all; arithmetic here is in doubles. Frames compute places in
  * floats, of lengths below 1: some 1e-6. */
