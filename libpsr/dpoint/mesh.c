@@ -122,7 +122,7 @@ static int put_facets(struct cutting *c, const struct corners *corners, const st
 	dpoint_surface_init(&pieces);
 	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
 		look_at(c, corners, mesh, t);
-		if (mesh->material[c->material].alpha != PSR_ALPHA_OPAQUE && c->options->look != NULL)
+		if (c->options->look != NULL && mesh->material[c->material].alpha != PSR_ALPHA_OPAQUE)
 			rc = put_pieces_as_facets(c->surface, &pieces, c);
 		else
 			rc = put_facet(c->surface, c);

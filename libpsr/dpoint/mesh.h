@@ -21,8 +21,8 @@ struct dpoint_mesh_options {
 	void *userdata;
 };
 
-/* Adds facets, those of triangles, or of the cells that are there where a material has alpha; and a candidate and a cell
- * for each piece of a triangle, with the shape of its corners' curvatures between them.
+/* Adds facets, those of triangles, or of the cells that are there where a material has alpha; and a candidate and a
+ * cell for each piece of a triangle, with the shape of its corners' curvatures between them.
  * Corners that share place and normal are one: so creases, where a mesh has several normals at a place or none, and
  * borders part the surface, and a strip beyond them keeps rectangles from reaching over. Parts are materials. Corners
  * without curvatures (of slivers) count as bad, and flat. MEMORY; LIMIT: more than 2^22 pieces, 2^27 looks, or 4096
