@@ -20,14 +20,13 @@ struct measuring {
 static void look(struct dpoint_bounds *bounds, struct bound_view *view, const struct measuring *m,
                  const struct dpoint_candidate *c)
 {
-	const struct dpoint_limit limit = { m->options->sine, { c->delta[0], c->delta[1] } };
 	const struct facets *facets = &m->surface->facets;
 	const double before = bounds->worst, asked = (double)m->options->error;
 	double low, high;
 	float extent[2];
 	int is_over;
 
-	dpoint_extent(extent, &c->point, &limit);
+	dpoint_candidate_extent(extent, c, m->options->sine);
 	high = bound_least(view, facets, &c->point, extent, before);
 	low = fmax(high / 2, before);
 	for (int i = 0; i < STEPS && high > before; i++) {

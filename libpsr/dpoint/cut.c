@@ -97,25 +97,25 @@ static int is_within(const struct cutting *c, const struct dpoint_cell *cell, co
 {
 	const struct dpoint_cover_options *cover = c->options->cover;
 	struct dpoint_candidate candidate;
-	struct dpoint_limit limit = { .sine = cover->sine };
 	float extent[2];
 
 	if (dpoint_candidate_make(&candidate, local, like) == DPOINT_BAD)
 		return 1;
-	if (!rectangle_around(limit.delta, &candidate, cell, cover))
+	if (!rectangle_around(candidate.delta, &candidate, cell, cover))
 		return 0;
-	dpoint_extent(extent, &candidate.point, &limit);
+	dpoint_candidate_extent(extent, &candidate, cover->sine);
 	return bound_look(c->view, &c->surface->facets, &candidate.point, extent, cover->error) == PSR_OK &&
 	       bound_holds(c->view, extent, cover->error, NULL);
 }
 
-static void cell_of(struct dpoint_cell *cell, struct dpoint_local *local, int *is_good, const struct cutting *c,
-                    const struct piece *p)
+/* Makes the cell and the shape in its middle. Returns 0 where that cannot be told: then the cell has no normal. */
+static int cell_of(struct dpoint_cell *cell, struct dpoint_local *local, const struct cutting *c, const struct piece *p)
 {
 	static const uint32_t square[4][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } };
 	static const uint32_t triangle[4][2] = { { 0, 0 }, { 1, 0 }, { 0, 1 }, { 0, 1 } };
 	const uint32_t (*corner)[2] = is_triangle(c, p) ? triangle : square;
 	double weight[3], place[3];
+	int is_good;
 
 	for (int i = 0; i < 4; i++) {
 		weigh(weight, c, p->x + corner[i][0] * p->size, p->y + corner[i][1] * p->size);
@@ -126,9 +126,10 @@ static void cell_of(struct dpoint_cell *cell, struct dpoint_local *local, int *i
 	memset(cell->normal, 0, sizeof cell->normal);
 	cell->part = c->material;
 	weigh_middle(weight, c, p);
-	*is_good = local_at(local, c, weight);
-	for (int k = 0; k < 3 && *is_good; k++)
+	is_good = local_at(local, c, weight);
+	for (int k = 0; k < 3 && is_good; k++)
 		cell->normal[k] = (float)local->axis[2][k];
+	return is_good;
 }
 
 /* The piece, or its quarters where the bound asks for smaller ones. */
@@ -139,9 +140,9 @@ static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
 	struct dpoint_candidate like = { .delta = { delta, delta }, .part = c->material, .point.attr = attr };
 	struct dpoint_cell made, *cell;
 	struct dpoint_local local;
-	int is_good, rc = PSR_OK;
+	const int is_good = cell_of(&made, &local, c, p);
+	int rc = PSR_OK;
 
-	cell_of(&made, &local, &is_good, c, p);
 	made.attr = attr;
 	if (c->view != NULL && half > 0 && is_good && !is_within(c, &made, &local, &like)) {
 		for (uint32_t i = 0; i < 4 && rc == PSR_OK; i++) {
@@ -233,7 +234,6 @@ static int gather(struct seen *seen, const struct cutting *c, const struct piece
 int cut(const struct cutting *c)
 {
 	const uint32_t size = c->grains * c->units;
-
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < c->n; i++)

@@ -78,7 +78,7 @@ struct mending {
 	struct bound_view view;
 };
 
-/* Kinds of patches over a cell. A bound has the first one that is within it, or the nearest. */
+/* Kinds of patches over a cell; without a bound they are FLAT. */
 enum kind { BENT, FLAT, OWN, N_KINDS };
 
 static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint32_t at, enum kind kind)
@@ -91,46 +91,47 @@ static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint3
 	return rectangle_around(out->delta, out, &m->surface->cell[at], m->options);
 }
 
-static int put_bounded(struct mending *m, uint32_t at)
+/* Finds the first kind of patch that is within the error, or the nearest. Returns 0 where none is near the surface at
+ * all; *is_bad: there is none of any kind. */
+static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mending *m, uint32_t at)
 {
-	struct dpoint_candidate patch, *best = NULL;
+	struct dpoint_candidate patch;
 	double least = INFINITY;
 
-	for (enum kind kind = BENT; kind < N_KINDS && least > (double)m->options->error; kind++) {
-		struct dpoint_limit limit = { .sine = m->options->sine };
+	*is_bad = 1;
+	for (enum kind kind = BENT; kind < N_KINDS && least > (double)m->options->error && !m->view.is_failed; kind++) {
 		float extent[2];
 		double error;
 
 		if (!patch_of(&patch, m, at, kind))
 			continue;
-		memcpy(limit.delta, patch.delta, sizeof limit.delta);
-		dpoint_extent(extent, &patch.point, &limit);
+		*is_bad = 0;
+		dpoint_candidate_extent(extent, &patch, m->options->sine);
 		error = bound_least(&m->view, &m->surface->facets, &patch.point, extent, (double)m->options->error);
-		if (m->view.is_failed)
-			return PSR_ERR_MEMORY;
-		if (best == NULL && (best = dpoint_surface_candidate(m->surface)) == NULL)
-			return PSR_ERR_MEMORY;
 		if (error < least) {
 			least = error;
-			*best = patch;
+			*out = patch;
 		}
 	}
-	if (best != NULL && least == INFINITY)
-		m->surface->n_candidates--;
-	m->surface->n_bad += best == NULL;
-	return PSR_OK;
+	return least < INFINITY;
 }
 
 static int put_patch(struct mending *m, uint32_t at)
 {
 	struct dpoint_candidate patch, *candidate;
+	int is_there, is_bad;
 
-	if (m->own != NULL)
-		return put_bounded(m, at);
-	if (flat_patch(&patch, m->surface, at, m->options, 0) == DPOINT_BAD) {
-		m->surface->n_bad++;
-		return PSR_OK;
+	if (m->own != NULL) {
+		is_there = bounded_patch(&patch, &is_bad, m, at);
+	} else {
+		is_there = patch_of(&patch, m, at, FLAT);
+		is_bad = !is_there;
 	}
+	if (m->view.is_failed)
+		return PSR_ERR_MEMORY;
+	m->surface->n_bad += (uint64_t)is_bad;
+	if (!is_there)
+		return PSR_OK;
 	candidate = dpoint_surface_candidate(m->surface);
 	if (candidate == NULL)
 		return PSR_ERR_MEMORY;

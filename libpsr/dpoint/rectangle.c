@@ -22,7 +22,6 @@ void looking_init(struct looking *l, const struct dpoint_surface *surface, const
 
 void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options)
 {
-	const struct dpoint_limit limit = { options->sine, { c->delta[0], c->delta[1] } };
 	const float lambda[2] = { c->point.lambda_u, c->point.lambda_u * c->point.rho };
 	float rise = 0;
 
@@ -34,7 +33,7 @@ void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const s
 	r->rho = c->point.rho;
 	r->part = c->part;
 	look_of(r->look, c->point.attr);
-	dpoint_extent(r->extent, &c->point, &limit);
+	dpoint_candidate_extent(r->extent, c, options->sine);
 	r->height = fminf(options->height, 0.5f * fminf(r->extent[0], r->extent[1]));
 	for (int k = 0; k < 2; k++)
 		rise = fmaxf(rise, 2 * fabsf(lambda[k]) * r->extent[k] * r->extent[k]);

@@ -16,11 +16,10 @@ static float delta_before(double place, float extent)
 /* Each turn makes the side shorter that leaves the larger rectangle. */
 static void shrink(struct dpoint_candidate *c, struct bound_view *view, const struct dpoint_cover_options *options)
 {
-	const struct dpoint_limit limit = { options->sine, { c->delta[0], c->delta[1] } };
 	float extent[2];
 	double place[2];
 
-	dpoint_extent(extent, &c->point, &limit);
+	dpoint_candidate_extent(extent, c, options->sine);
 	while (!bound_holds(view, extent, (double)options->error, place) && !view->is_failed) {
 		const float u = delta_before(place[0], extent[0]), v = delta_before(place[1], extent[1]);
 		const int k = u * extent[1] < v * extent[0];
@@ -42,9 +41,7 @@ static int covers_own(const struct looking *l, const struct dpoint_candidate *c)
 
 static int look(struct bound_view *view, const struct looking *l, const struct dpoint_candidate *c, float extent[2])
 {
-	const struct dpoint_limit limit = { l->options->sine, { c->delta[0], c->delta[1] } };
-
-	dpoint_extent(extent, &c->point, &limit);
+	dpoint_candidate_extent(extent, c, l->options->sine);
 	return bound_look(view, &l->surface->facets, &c->point, extent, (double)l->options->error);
 }
 

@@ -28,6 +28,14 @@ struct dpoint_candidate {
 	uint32_t cell;     /* that its place is in */
 };
 
+/* Half sides of the candidate's rectangle at this sine of epsilon. */
+static inline void dpoint_candidate_extent(float extent[2], const struct dpoint_candidate *c, float sine)
+{
+	const struct dpoint_limit limit = { sine, { c->delta[0], c->delta[1] } };
+
+	dpoint_extent(extent, &c->point, &limit);
+}
+
 struct dpoint_surface {
 	struct dpoint_cell *cell;
 	struct dpoint_candidate *candidate;

@@ -5,17 +5,20 @@
 #include "cube.h"
 #include "warp_list.h"
 
-/* Prepares cubes, and prefetches their normals and offsets where these are needed. */
+/* Prepares cubes, and prefetches their normals and offsets where these are needed: by points, for what faces away and to
+ * move wide leaves; by splats, always. */
 static inline void make_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
-                              uint32_t n)
+                              uint32_t n, int for_splats)
 {
 	for (uint32_t i = 0; i < n; i++) {
 		struct warp_cube *c = &cubes[i];
 
 		warp_cube_make(c, &t->instance[entry[i].instance], entry[i].slot);
-		if (entry[i].is_mixed || (entry[i].is_wide && c->offset != NULL))
+		const int moves = c->offset != NULL && (for_splats || entry[i].is_wide);
+
+		if (for_splats || entry[i].is_mixed || moves)
 			__builtin_prefetch(c->normal);
-		if (entry[i].is_wide && c->offset != NULL)
+		if (moves)
 			__builtin_prefetch(c->offset);
 	}
 }
@@ -47,6 +50,15 @@ static inline uint32_t batch_of(uint32_t first, uint32_t n)
 	return first >= n ? 0 : n - first < BLOCKS ? n - first : BLOCKS;
 }
 
+/* Prepares the batch that begins with entry e, and fetches what later ones need. */
+static inline void next_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
+                              uint32_t e, uint32_t n, int for_splats)
+{
+	fetch_cubes(t, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
+	fetch_codes(t, entry + e + BLOCKS, batch_of(e + BLOCKS, n));
+	make_cubes(cubes, t, entry + e, batch_of(e, n), for_splats);
+}
+
 /* Lists the words of a cube's leaves, and their cells. */
 typedef void list_cube_fn(struct words *words, struct cells *cells, const struct warp_target *t,
                           const struct bin_entry *entry, const struct warp_cube *cube);
@@ -63,11 +75,8 @@ static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *li
 
 	words.n = cells.n = cells.level = 0;
 	for (uint32_t e = 0; e < n; e++) {
-		if (e % BLOCKS == 0) {
-			fetch_cubes(target, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
-			fetch_codes(target, entry + e + BLOCKS, batch_of(e + BLOCKS, n));
-			make_cubes(cubes, target, entry + e, batch_of(e, n));
-		}
+		if (e % BLOCKS == 0)
+			next_cubes(cubes, target, entry, e, n, 0);
 		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
 			n_inside += words.n;
 			lower_words(target->word, &words);

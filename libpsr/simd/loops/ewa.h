@@ -248,21 +248,6 @@ struct ewa_parts {
 	ewa_draw_sums_fn *draw_sums;
 };
 
-/* Fetches what a cube's leaves need, as make_cubes() of leaves_list.h. */
-static inline void ewa_make_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
-                                  uint32_t n)
-{
-	for (uint32_t i = 0; i < n; i++) {
-		struct warp_cube *c = &cubes[i];
-
-		warp_cube_make(c, &t->instance[entry[i].instance], entry[i].slot);
-		if (c->normal != NULL)
-			__builtin_prefetch(c->normal);
-		if (c->offset != NULL)
-			__builtin_prefetch(c->offset);
-	}
-}
-
 /* The cubes of a run of entries on their way to a batch. */
 struct ewa_reader {
 	const struct warp_target *t;
@@ -283,11 +268,8 @@ static inline __attribute__((always_inline)) int ewa_fill(struct ewa_leaves *l, 
 		const struct warp_instance *in = &t->instance[r->entry[e].instance];
 		const struct warp_cube *cube = &r->cubes[e % BLOCKS];
 
-		if (e % BLOCKS == 0) {
-			fetch_cubes(t, r->entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, r->n));
-			fetch_codes(t, r->entry + e + BLOCKS, batch_of(e + BLOCKS, r->n));
-			ewa_make_cubes(r->cubes, t, r->entry + e, batch_of(e, r->n));
-		}
+		if (e % BLOCKS == 0)
+			next_cubes(r->cubes, t, r->entry, e, r->n, 1);
 		const uint32_t n = (uint32_t)__builtin_popcountll(cube->mask);
 		if (l->n > 0 && (l->n + n > EWA_BATCH || in != l->in))
 			return 1;

@@ -109,7 +109,8 @@ static void put(double value[N_COLUMNS], const struct row *row, const struct dpo
 static int measure(double value[N_COLUMNS], const struct row *row, struct study *study)
 {
 	const struct dpoint_cover_options options = {
-		dpoint_sine(EPSILON), SLACK, (float)(row->degrees * PSR_DEGREE), row->height, row->is_within_parts, OVERHANG, 0, 0,
+		.sine = dpoint_sine(EPSILON), .slack = SLACK, .angle = (float)(row->degrees * PSR_DEGREE), .height = row->height,
+		.is_within_parts = row->is_within_parts, .overhang = OVERHANG,
 	};
 	struct dpoint_surface surface;
 	struct dpoint_cover cover = { 0 };

@@ -123,7 +123,9 @@ static void choose_all(struct dpoint_surface *surface, struct dpoint_cover *cove
  * grows and once as its point moves, but for its tilt. A candidate that mends a hole reaches over by its cell. */
 static void no_extent_crosses_an_edge(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.01), 1e-5f, 0.05f, 0.005f, 0, OVERHANG, 0 };
+	const struct dpoint_cover_options options = {
+		.sine = dpoint_sine(0.01), .slack = 1e-5f, .angle = 0.05f, .height = 0.005f, .overhang = OVERHANG,
+	};
 	struct grid_mesh *m = malloc(sizeof *m);
 
 	(void)state;
