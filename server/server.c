@@ -272,6 +272,7 @@ static int create_parts(struct server *server)
 	    || psr_pool_create_for_jobs(&server->io, IO_THREADS, NULL) != PSR_OK || codec_create(&server->codec) != PSR_OK
 	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
 		return PSR_ERR_MEMORY;
+	psr_pool_keep_apart(server->pool);
 	server->catalogue.io = server->io;
 	server->catalogue.others = (struct catalogue_others){ others_held, server };
 	if (opener_create(&server->opener, &(struct opener_parts){

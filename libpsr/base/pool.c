@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 #include "pool_core.h"
+#include "turns.h"
 
 int psr_pool_all_cores(void)
 {
@@ -64,6 +65,16 @@ int psr_pool_create(struct psr_pool **out, int n_threads, struct psr_error *err)
 int psr_pool_create_for_jobs(struct psr_pool **out, int n_threads, struct psr_error *err)
 {
 	return create(out, n_threads, 1, err);
+}
+
+void psr_pool_keep_apart(struct psr_pool *pool)
+{
+	pthread_t thread[POOL_MAX_CORES];
+
+	assert(pool->with_jobs);
+	for (int i = 0; i < pool->n_workers; i++)
+		thread[i] = pool->worker[i]->thread;
+	turns_keep_apart(thread, pool->n_workers);
 }
 
 void psr_pool_destroy(struct psr_pool *pool)

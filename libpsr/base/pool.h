@@ -25,6 +25,9 @@ int psr_pool_all_cores(void);
 /* Makes a pool that takes jobs: n_threads cores, beside the threads of callers. Errors as of psr_pool_create(). */
 int psr_pool_create_for_jobs(struct psr_pool **out, int n_threads, struct psr_error *err);
 
+/* Each thread of a pool that takes jobs stays on a core of its own, if the process may use just as many. */
+void psr_pool_keep_apart(struct psr_pool *pool);
+
 /* Wakes sleeping threads for a loop that comes in some microseconds. NULL is fine. */
 void psr_pool_wake(struct psr_pool *pool);
 

@@ -29,6 +29,7 @@ struct worker {
 	enum pool_leave leave;
 	uint64_t begun_ns;  /* the core works for the job since then */
 	uint64_t marked_ns; /* until then, that time is the job's */
+	uint64_t turn_ns;   /* when it last let others in: the thread's own */
 	uint64_t until_ns;  /* when a thread that lends itself wants to go; 0: never */
 };
 
@@ -53,6 +54,7 @@ struct job {
 	int is_waiting; /* the fiber wants a core: before it has begun, too */
 	int is_ending;  /* the fiber waits for helpers at the end of a loop */
 	uint64_t asked_ns; /* the fiber's: when it last gave way, or would have */
+	unsigned n_asked;  /* the fiber's: questions on a thread that lends itself */
 	atomic_uint_fast64_t used_ns;
 };
 

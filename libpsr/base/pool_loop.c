@@ -3,6 +3,7 @@
 #include <limits.h>
 #include "clock.h"
 #include "pool_core.h"
+#include "turns.h"
 
 /* While others wait, a thread asks after each index whether its core is to go to them, but not more often than this:
  * asking takes the mutex. Refining asks always. */
@@ -11,6 +12,12 @@
 /* A small job has one core. Waking another takes some 50 us, and so does its spinning, many times a job: of a frame of
  * 64x64 that is more than the frame. */
 #define SMALL_NS 1000000
+
+/* How long a thread computes before it lets those in who wait for its processor. */
+#define TURN_NS 500000
+
+/* Reading the clock at each question of a small frame takes some 5 % of it. */
+#define LENT_QUESTIONS 4
 
 int pool_is_taken(const struct loop *loop)
 {
@@ -51,6 +58,14 @@ void psr_pool_wake(struct psr_pool *pool)
 	pthread_mutex_unlock(&pool->mutex);
 }
 
+static void let_others_in(struct worker *worker, uint64_t now)
+{
+	if (now - worker->turn_ns < TURN_NS)
+		return;
+	worker->turn_ns = now;
+	turns_let_others_in();
+}
+
 /* After an index; 0: the core goes to another job. */
 static int may_go_on(struct psr_pool *pool, struct worker *helper, struct job *job, struct loop *loop,
                      uint64_t *asked_ns)
@@ -58,6 +73,7 @@ static int may_go_on(struct psr_pool *pool, struct worker *helper, struct job *j
 	const uint64_t now = clock_ns();
 	int stays = 1;
 
+	let_others_in(helper != NULL ? helper : job->worker, now);
 	pool_mark(helper != NULL ? helper : job->worker, job, now);
 	if (helper == NULL && loop->n_silent > 0
 	    && atomic_load_explicit(&job->used_ns, memory_order_relaxed) >= SMALL_NS) {
@@ -87,15 +103,18 @@ static int is_wanted(const struct psr_pool *pool, const struct job *job)
 
 void pool_give_way(void)
 {
-	const struct worker *self = pool_current_worker();
+	struct worker *self = pool_current_worker();
 	struct job *job = pool_current_job();
 	struct psr_pool *pool;
 	uint64_t now;
 
-	if (job == NULL || self->is_helping || (self->until_ns == 0 && !is_wanted(self->pool, job)))
+	if (job == NULL || (self->until_ns != 0 && ++job->n_asked % LENT_QUESTIONS != 0))
 		return;
 	pool = self->pool;
 	now = clock_ns();
+	let_others_in(self, now);
+	if (self->is_helping || (self->until_ns == 0 && !is_wanted(pool, job)))
+		return;
 	if (now - job->asked_ns < SLICE_NS)
 		return;
 	job->asked_ns = now;
@@ -174,6 +193,12 @@ static void run_in_job(struct psr_pool *pool, struct job *job, struct loop *loop
 	pthread_mutex_unlock(&pool->mutex);
 }
 
+/* A thread that lends itself stays for half a millisecond, in which nobody else would come to help. */
+static int is_lent(const struct job *job)
+{
+	return job->worker->until_ns != 0;
+}
+
 /* A loop of one index is serial. */
 static void run_in_place(struct psr_pool *pool, struct job *job, struct loop *loop)
 {
@@ -226,7 +251,7 @@ void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata
 	if (n <= 0)
 		return;
 	if (pool != NULL && job != NULL && job->worker == self && self->pool == pool)
-		(n == 1 ? run_in_place : run_in_job)(pool, job, &loop);
+		(n == 1 || is_lent(job) ? run_in_place : run_in_job)(pool, job, &loop);
 	else if (n == 1 || psr_pool_threads(pool) == 1)
 		pool_run_indices(pool, NULL, NULL, &loop);
 	else

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include "clock.h"
 #include "pool_core.h"
+#include "turns.h"
 
 #define SPIN_NS 50000
 
@@ -160,6 +161,8 @@ static void *work(void *userdata)
 	int has_spun = 1;
 
 	current_worker = self;
+	if (pool->with_jobs)
+		turns_be_short(); /* of which it gives up what is left, see turns.h */
 	pthread_mutex_lock(&pool->mutex);
 	for (;;) {
 		const uint64_t now = pool_now(pool);

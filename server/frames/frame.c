@@ -183,7 +183,7 @@ int frame_is_slight(const struct frame *frame)
 	       && frame->drawing.settings.smooth != PSR_SMOOTH_FINE && !frame->drawing.settings.splats
 	       && (uint64_t)request->width * request->height <= SLIGHT_PIXELS
 	       && scene->scene.n_instances <= SLIGHT_INSTANCES && scene_blocks(scene) <= SLIGHT_BLOCKS
-	       && scene_shadow_lights(scene) == 0 && !scene_has_sheer(scene);
+	       && scene_shadow_lights(scene) == 0;
 }
 
 const char *frame_never_fits(struct psr_error *err, const struct frame *frame, const struct schedule *schedule)

@@ -201,6 +201,10 @@ int loop_run(struct loop *loop, struct psr_error *err)
 		dispatch(loop, 1);
 		loop->n_batch = 0;
 		loop->on_batch_end(loop->userdata);
+		if (atomic_load(&loop->last_note) != NULL) { /* what its end did itself is done without another wait */
+			run_notes(loop);
+			loop->on_batch_end(loop->userdata);
+		}
 	}
 	return PSR_OK;
 }

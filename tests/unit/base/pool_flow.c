@@ -314,24 +314,36 @@ static void a_long_part_gives_way_where_it_asks(void **state)
 struct lent {
 	struct psr_pool *pool;
 	pthread_t thread;
-	int is_long; /* it goes on until its thread is back */
+	int is_long;   /* it goes on until its thread is back */
+	int is_a_loop; /* whose indices ask */
 	atomic_int is_back, is_done;
 };
+
+static void ask_until_back(int i, void *userdata)
+{
+	const struct lent *lent = userdata;
+
+	(void)i;
+	while (lent->is_long && !atomic_load(&lent->is_back))
+		pool_give_way();
+}
 
 static void run_lent(void *userdata)
 {
 	struct lent *lent = userdata;
 
 	lent->thread = pthread_self();
-	while (lent->is_long && !atomic_load(&lent->is_back))
-		pool_give_way();
+	if (lent->is_a_loop)
+		psr_pool_for(lent->pool, 3, ask_until_back, lent);
+	else
+		ask_until_back(0, lent);
 	atomic_store(&lent->is_done, 1);
 }
 
 /* Returns whether the job began on this thread. */
-static int lend_once(struct psr_pool *pool, struct pool_flow *flow, int is_long, uint64_t most_ns)
+static int lend_once(struct psr_pool *pool, struct pool_flow *flow, int is_long, int is_a_loop, uint64_t most_ns)
 {
-	struct lent lent = { .pool = pool, .is_long = is_long };
+	struct lent lent = { .pool = pool, .is_long = is_long, .is_a_loop = is_a_loop };
 	const struct pool_job job = { .flow = flow, .fn = run_lent, .userdata = &lent, .is_lent_to = 1 };
 
 	assert_int_equal(psr_pool_submit(pool, &job), PSR_OK);
@@ -349,11 +361,13 @@ static void a_thread_that_lends_itself_runs_a_job_and_gets_back(void **state)
 	struct pool_flow *flow = make_flow(pool);
 
 	(void)state;
-	assert_false(lend_once(pool, flow, 0, UINT64_C(1) << 60));
-	while (!lend_once(pool, flow, 0, UINT64_C(1) << 60))
-		;
-	while (!lend_once(pool, flow, 1, 1000000))
-		lend_once(pool, flow, 0, 0);
+	assert_false(lend_once(pool, flow, 0, 0, UINT64_C(1) << 60));
+	for (int is_a_loop = 0; is_a_loop < 2; is_a_loop++) {
+		while (!lend_once(pool, flow, 0, is_a_loop, UINT64_C(1) << 60))
+			;
+		while (!lend_once(pool, flow, 1, is_a_loop, 1000000))
+			lend_once(pool, flow, 0, is_a_loop, 0);
+	}
 	psr_pool_lend(pool, 1000000);
 	pool_flow_destroy(flow);
 	psr_pool_destroy(pool);
