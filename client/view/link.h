@@ -41,6 +41,7 @@ struct link_wish {
 
 	double spacing_px;           /* 2^-6..2^6: 1 */
 	int is_smooth;               /* at rest: 1 */
+	int with_splats;             /* octrees as splats, in motion, too, where the server can: 0 */
 	uint16_t pass_limit;         /* refinement at rest: 0 */
 	uint32_t planes;             /* 1 << enum psr_plane: colour and depth. Others exclude refinement: pass_limit is 0 */
 

@@ -107,6 +107,7 @@ static int send_frame(struct link_view *view, const struct link_content *content
 	int code;
 
 	link_frame(&frame, asked, content->wish, content->box_min, content->box_max, is_direct);
+	frame.settings.splats = content->wish->with_splats && offered & PSR_CAP_SPLATS;
 	code = link_view_scene(view, content, &frame.camera, err);
 	if (code != PSR_OK)
 		return code;

@@ -75,7 +75,8 @@ int link_wish_is_same(const struct link_wish *a, const struct link_wish *b)
 	              && a->width == b->width && a->height == b->height && a->overscan == b->overscan
 	              && a->has_key_light == b->has_key_light && a->ambient == b->ambient
 	              && memcmp(a->background, b->background, sizeof a->background) == 0 && a->spacing_px == b->spacing_px
-	              && a->is_smooth == b->is_smooth && a->pass_limit == b->pass_limit && a->planes == b->planes
+	              && a->is_smooth == b->is_smooth && a->with_splats == b->with_splats
+	              && a->pass_limit == b->pass_limit && a->planes == b->planes
 	              && a->fps == b->fps && a->least_quality == b->least_quality && a->most_quality == b->most_quality
 	              && a->most_scale == b->most_scale && a->is_rest == b->is_rest;
 

@@ -52,6 +52,7 @@ int subject_init(struct subject *subject, const struct scene_wish *scene, const 
 	subject->spacing = quality->settings.spacing_px;
 	subject->is_smooth = quality->settings.smooth != 0;
 	subject->passes = quality->pass_limit;
+	subject->with_splats = quality->settings.splats;
 	return code;
 }
 
@@ -276,6 +277,7 @@ void subject_wish(const struct subject *subject, struct link_wish *wish, struct 
 	memcpy(wish->background, subject->background, sizeof wish->background);
 	wish->spacing_px = subject->spacing;
 	wish->is_smooth = subject->is_smooth;
+	wish->with_splats = subject->with_splats;
 	wish->planes = 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH;
 	if (subject->stage != NULL)
 		wish->planes |= show_planes(subject->stage);
@@ -357,9 +359,9 @@ char *subject_command(const struct subject *subject, const struct hand *hand, co
 	put_vector(to, "up", pose->up);
 	fprintf(to, pose->fov > 0 ? " --fov %.17g" : " --ortho %.17g", pose->fov > 0 ? pose->fov : pose->ortho_height);
 	put_lights(to, subject, &hand->camera);
-	fprintf(to, " --background '#%02x%02x%02x' --spacing %.17g --passes %u%s", subject->background[0],
+	fprintf(to, " --background '#%02x%02x%02x' --spacing %.17g --passes %u%s%s", subject->background[0],
 	        subject->background[1], subject->background[2], subject->spacing, subject->passes,
-	        subject->is_smooth ? " --smooth" : " --no-smooth");
+	        subject->is_smooth ? " --smooth" : " --no-smooth", subject->with_splats ? " --splats" : "");
 	if (subject->stage != NULL)
 		put_option(to, "show", subject->stage_name);
 	if (fclose(to) == 0)

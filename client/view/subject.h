@@ -33,7 +33,7 @@ struct subject {
 	uint8_t background[3];
 	uint8_t color_by;            /* of all instances: enum psr_wire_color */
 	double spacing;
-	int is_smooth;
+	int is_smooth, with_splats;
 	uint16_t passes;
 	const struct show *stage;    /* a picture of a stage in the place of colours; NULL: none */
 	const char *stage_name;
@@ -85,6 +85,14 @@ int subject_has_color(const struct link_scene *scene, uint8_t color_by);
 void subject_next_color(struct subject *subject, const struct link_scene *scene, char *note, size_t note_size);
 /* UNSUPPORTED: a model of the scene does not have the number; colours are its own now. */
 int subject_check_color(struct subject *subject, const struct link_scene *scene, struct psr_error *err);
+
+/* ---- subject_octree.c ---- */
+
+/* Whether an octree is shown: an instance that asks for its model's, or leaves it to the server, of a model without
+ * blocks. scene NULL: no. */
+int subject_has_octree(const struct subject *subject, const struct link_scene *scene);
+/* Shows octrees as splats, or as points again; without one nothing changes. Writes what a viewer says of it. */
+void subject_toggle_splats(struct subject *subject, const struct link_scene *scene, char *note, size_t note_size);
 
 /* ---- subject.c, again ---- */
 

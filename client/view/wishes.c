@@ -37,6 +37,7 @@ void wishes_add_options(struct optlist *list, struct wishes *wishes, const struc
 	scene_add_light_options(list, &wishes->scene);
 	optlist_heading(list, "Quality", own->quality_hint);
 	quality_add_options(list, &wishes->quality);
+	quality_add_splats_option(list, &wishes->quality);
 }
 
 int wishes_parse(struct wishes *wishes, const struct psr_cli *cli, int argc, char **argv, int needs_model,

@@ -55,6 +55,15 @@ says "colours by class, and by the key height" "^exit 0" terminal 60x21 480x336 
 	--color-by class --pixels kitty
 psr shot --quality good --server "$server" --model scan --color-by class --size 480x320 -o "$work/shot.ppm" 2>/dev/null
 check "with the legend of psr shot" cmp "$work/class.ppm" "$work/shot.ppm"
+# The second key does nothing but take the note away.
+says "an octree as splats, and by the key points" "^exit 0" terminal 60x21 480x336 "wait:sharp
+	picture:$work/splats.ppm keys:rx wait:sharp picture:$work/points.ppm keys:q" psr view --term --server "$server" \
+	--model knot --splats --pixels kitty
+for way in splats points; do
+	flag=$(grep splats <<<"--$way")
+	psr shot --quality good --server "$server" --model knot $flag --size 480x320 -o "$work/shot.ppm" 2>/dev/null
+	check "$way are those of psr shot" cmp "$work/$way.ppm" "$work/shot.ppm"
+done
 is_far() { ! is_near "$@"; }
 psr shot --quality good --server "$server" --model teapot --view right --size 320x192 -o "$work/other.ppm" 2>/dev/null
 check "and not to another side's" is_far "$work/sixel.ppm" "$work/other.ppm"

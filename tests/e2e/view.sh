@@ -208,6 +208,26 @@ colored "by height, which any model has" height
 xdotool key Escape
 ends "the end of the colours"
 
+# --- octrees as splats ---
+: >"$work/view.log"
+rm "$work"/shots/*
+n_shots=0
+view --server "$address" --model knot --splats --size 320x240 --no-inertia
+is_true "an octree as splats"
+check "of which the command says so" grep -q -- ' --splats' <<<"$command"
+cp "$work/true.png" "$work/splats.png"
+xdotool key r
+is_true "and as points"
+check "says nothing of splats" sh -c '! grep -q splats <<END
+'"$command"'
+END'
+check "which is another picture" sh -c "! cmp -s '$work/splats.png' '$work/true.png'"
+xdotool key r
+is_true "and as splats again"
+check "the same ones" cmp "$work/splats.png" "$work/true.png"
+xdotool key Escape
+ends "the end of the splats"
+
 # --- a way of the camera ---
 view --server "$address" --model wheel --size 320x240 --no-inertia --record "$work/way.json"
 n_shots=0

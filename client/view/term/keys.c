@@ -112,7 +112,9 @@ void keys_event(struct viewer *viewer, const struct input_event *event)
 		toggle(viewer, "inertia", &viewer->hand.has_inertia);
 	else if (event->key == 'v')
 		subject_next_color(&viewer->subject, viewer->scene, viewer->note, sizeof viewer->note);
+	else if (event->key == 'r')
+		subject_toggle_splats(&viewer->subject, viewer->scene, viewer->note, sizeof viewer->note);
 	else if (event->key == '?')
 		snprintf(viewer->note, sizeof viewer->note, "drag: turn, ctrl-drag: move, wheel +-: zoom, arrows, "
-		         "1-6 sides, h home, o ortho, s shadows, a smooth, v colours, q quit");
+		         "1-6 sides, h home, o ortho, s shadows, a smooth, r splats, v colours, q quit");
 }

@@ -202,11 +202,12 @@ static void next_stage(struct viewer *viewer)
 	viewer_note(viewer, "%s", viewer->subject.stage != NULL ? viewer->subject.stage_name : "colours");
 }
 
-static void next_color(struct viewer *viewer)
+static void change(struct viewer *viewer,
+                   void (*how)(struct subject *subject, const struct link_scene *scene, char *note, size_t note_size))
 {
 	char note[64];
 
-	subject_next_color(&viewer->subject, viewer->scene, note, sizeof note);
+	how(&viewer->subject, viewer->scene, note, sizeof note);
 	viewer_note(viewer, "%s", note);
 }
 
@@ -285,7 +286,8 @@ static int key_of_light(struct viewer *viewer, SDL_Keycode key)
 	case SDLK_PAGEDOWN: set_ambient(viewer, -0.05); break;
 	case SDLK_b: next_background(viewer); break;
 	case SDLK_t: next_stage(viewer); break;
-	case SDLK_v: next_color(viewer); break;
+	case SDLK_v: change(viewer, subject_next_color); break;
+	case SDLK_r: change(viewer, subject_toggle_splats); break;
 	case SDLK_k:
 		viewer->subject.has_key_light = 1;
 		viewer->subject.n_lights = 0;

@@ -65,9 +65,9 @@ static void draw_picture_lines(const struct viewer *viewer, const struct link_pi
 	ImGui::Text("latency %.0f ms   decode %.1f ms   join %.1f ms   warp %.1f ms",
 	            (double)(picture->came_ns - picture->asked_ns) * 1e-6, (double)picture->decode_ns * 1e-6,
 	            viewer->shown.take_ms, viewer->shown.warp.ms);
-	ImGui::Text("%ux%u / %u   spacing %g%s   %s   %.1f kB   error %.2f px", picture->frame.width,
+	ImGui::Text("%ux%u / %u   spacing %g%s%s   %s   %.1f kB   error %.2f px", picture->frame.width,
 	            picture->frame.height, settings->scale, settings->spacing_px, settings->smooth ? "   smooth" : "",
-	            codec, (double)picture->bytes * 1e-3, picture->end.error_px);
+	            settings->splats ? "   splats" : "", codec, (double)picture->bytes * 1e-3, picture->end.error_px);
 	draw_stages(&picture->end);
 	if (viewer->shown.is_exact)
 		ImGui::Text("%s", !picture->is_sharp       ? "as received"
@@ -176,7 +176,7 @@ static void draw_help(struct viewer *viewer)
 		{ "c   o   i", "the file's cameras; no perspective; inertia" },
 		{ "L drag   k", "move the light, Shift turns a spot; let it go with the camera" },
 		{ "click, G drag", "choose a model, move it; Shift turns, Ctrl scales" },
-		{ "x   n", "shadows; smoothing" },
+		{ "x   n   r", "shadows; smoothing; octrees as splats" },
 		{ ", .   PgUp PgDn   b", "spacing; ambient; background" },
 		{ "v", "colours by intensity, class, height, return, as far as the model has them" },
 		{ "t   m", "pictures of stages; measure" },

@@ -204,7 +204,8 @@ static void draw_colors(struct viewer *viewer)
 static void draw_quality(struct viewer *viewer)
 {
 	struct subject *subject = &viewer->subject;
-	bool is_smooth = subject->is_smooth != 0;
+	const bool has_octree = subject_has_octree(subject, viewer->scene) != 0;
+	bool is_smooth = subject->is_smooth != 0, with_splats = subject->with_splats != 0;
 	int passes = subject->passes;
 	float spacing = (float)subject->spacing;
 
@@ -212,6 +213,11 @@ static void draw_quality(struct viewer *viewer)
 		subject->spacing = (double)spacing;
 	if (ImGui::Checkbox("smooth", &is_smooth))
 		subject->is_smooth = is_smooth;
+	ImGui::SameLine();
+	ImGui::BeginDisabled(!has_octree);
+	if (ImGui::Checkbox("splats", &with_splats))
+		subject->with_splats = with_splats;
+	ImGui::EndDisabled();
 	if (ImGui::SliderInt("passes", &passes, 0, PSR_MAX_PASS))
 		subject->passes = (uint16_t)passes;
 	draw_colors(viewer);

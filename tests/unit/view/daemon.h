@@ -153,6 +153,7 @@ static inline void draw_here(struct psr_frame *frame, const struct link_wish *wi
 	assert_int_equal(psr_model_map(&model, path, NULL), PSR_OK);
 	psr_shot_default(&shot, wish->width, wish->height);
 	shot.settings.smooth = wish->is_smooth;
+	shot.settings.with_splats = wish->with_splats;
 	shot.settings.spacing_px = wish->spacing_px;
 	shot.planes = wish->planes;
 	shot.camera = &wish->camera;

@@ -298,6 +298,36 @@ static void colours_that_tell_a_number_come_with_the_picture(void **state)
 	link_close(link_);
 }
 
+static void octrees_are_splats_where_it_is_wished(void **state)
+{
+	struct link_picture *points, *splats;
+	struct psr_model *knot;
+	char path[PATH_MAX + 16];
+
+	(void)state;
+	snprintf(path, sizeof path, "%s/knot.psr", folder);
+	assert_int_equal(psr_model_read(&knot, "tests/golden/knot.psr", NULL), PSR_OK);
+	assert_int_equal(psr_model_write(knot, path, NULL), PSR_OK);
+	psr_model_unref(knot);
+	kill_psrd(); /* so that the next one lists it */
+	start_psrd(NULL);
+	open_link(address);
+	wish_default(&wish, &instance, "knot");
+	wish.with_splats = 1;
+	say_wish(&wish);
+	splats = wait_sharp();
+	assert_drawn_as_wished(splats, &wish);
+	assert_true(splats->begin.settings.splats);
+	wish.with_splats = 0;
+	say_wish(&wish);
+	points = wait_sharp();
+	assert_drawn_as_wished(points, &wish);
+	assert_memory_not_equal(points->frame.rgb, splats->frame.rgb, 3 * 320 * 240);
+	link_release(points);
+	link_release(splats);
+	link_close(link_);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -310,6 +340,7 @@ int main(void)
 		cmocka_unit_test(a_link_to_nobody_closes_at_once),
 		cmocka_unit_test(wishes_out_of_range_change_nothing),
 		cmocka_unit_test(colours_that_tell_a_number_come_with_the_picture),
+		cmocka_unit_test(octrees_are_splats_where_it_is_wished),
 		cmocka_unit_test(a_server_that_says_nothing_is_given_up_and_comes_back),
 	};
 
