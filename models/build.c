@@ -154,13 +154,14 @@ static int join(struct made *made, const struct wish *wish, struct psr_error *er
 static int measure_ladder(struct made *made, const struct wish *wish, struct psr_error *err)
 {
 	static struct psr_calibrated view[CALIBRATE_VIEWS];
+	static struct psr_calibrated_fine fine[CALIBRATE_VIEWS];
 	const struct calibrate_options options = {
 		.n_views = CALIBRATE_VIEWS, .seed = CALIBRATION_SEED, .n_threads = wish->build.n_threads,
 		.on_progress = progress_show, .userdata = wish->build.userdata,
 	};
-	const struct psr_calibration calibration = { CALIBRATE_VIEWS, view };
+	const struct psr_calibration calibration = { CALIBRATE_VIEWS, view, fine };
 	struct psr_model *calibrated;
-	int code = calibrate(view, made->model, made->mesh, &options, err);
+	int code = calibrate(view, fine, made->model, made->mesh, &options, err);
 
 	if (code == PSR_OK)
 		code = psr_model_calibrate(&calibrated, made->model, &calibration, err);

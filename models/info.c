@@ -117,8 +117,9 @@ static void print_presets(const struct psr_presets *p)
 		printf("  %-12s    %s\n", view_light_kinds[p->light[i].light.kind], p->light[i].name);
 }
 
-/* Medians over the views; times as multiples of that of the plain picture. */
+/* Medians over the views that were measured with a rung; times as multiples of that of the plain picture. */
 struct rung_figures {
+	uint32_t n;
 	double rmse, times;
 };
 
@@ -127,11 +128,17 @@ static void take_rung(struct rung_figures *figures, const struct psr_calibration
 	const int plain = 4; /* scale 1, spacing 1 */
 	double rmse[PSR_MAX_CALIBRATED], times[PSR_MAX_CALIBRATED];
 
+	uint32_t n = 0;
+
 	for (uint32_t i = 0; i < c->n; i++) {
-		rmse[i] = (double)c->view[i].rmse[rung];
-		times[i] = (double)c->view[i].ms[rung] / (double)c->view[i].ms[plain];
+		const struct psr_measured at = psr_calibration_at(c, i, rung);
+
+		if (!(at.ms > 0))
+			continue;
+		rmse[n] = at.rmse;
+		times[n++] = at.ms / psr_calibration_at(c, i, plain).ms;
 	}
-	*figures = (struct rung_figures){ stats_median(rmse, c->n), stats_median(times, c->n) };
+	*figures = (struct rung_figures){ n, n > 0 ? stats_median(rmse, n) : 0, n > 0 ? stats_median(times, n) : 0 };
 }
 
 static void print_calibration(const struct psr_calibration *c)
@@ -145,11 +152,13 @@ static void print_calibration(const struct psr_calibration *c)
 		struct rung_figures figures;
 
 		take_rung(&figures, c, r);
+		if (figures.n == 0)
+			continue;
 		if (rung->pass > 0)
 			printf("  pass %u                 ", rung->pass);
 		else
 			printf("  scale %u, spacing %-4g%s", rung->scale, rung->spacing_px,
-			       rung->smooth ? ", smooth" : "        ");
+			       r == PSR_RUNG_FINE ? ", fine  " : rung->smooth ? ", smooth" : "        ");
 		printf("  %6.2f  %8.2f\n", figures.rmse, figures.times);
 	}
 }
@@ -164,13 +173,16 @@ static void add_calibration(cJSON *root, const struct psr_calibration *c)
 	cJSON_AddNumberToObject(part, "views", c->n);
 	rungs = cJSON_AddArrayToObject(part, "rungs");
 	for (int r = 0; r < PSR_RUNGS; r++) {
-		cJSON *rung = cJSON_CreateObject();
 		struct rung_figures figures;
 
 		take_rung(&figures, c, r);
+		if (figures.n == 0)
+			continue;
+		cJSON *rung = cJSON_CreateObject();
 		cJSON_AddNumberToObject(rung, "scale", psr_ladder[r].scale);
 		cJSON_AddNumberToObject(rung, "spacing_px", psr_ladder[r].spacing_px);
-		cJSON_AddBoolToObject(rung, "smooth", psr_ladder[r].smooth);
+		cJSON_AddBoolToObject(rung, "smooth", psr_ladder[r].smooth > 0);
+		cJSON_AddBoolToObject(rung, "fine", r == PSR_RUNG_FINE);
 		cJSON_AddNumberToObject(rung, "pass", psr_ladder[r].pass);
 		cJSON_AddNumberToObject(rung, "rmse", figures.rmse);
 		cJSON_AddNumberToObject(rung, "time", figures.times);

@@ -45,7 +45,7 @@ static double rmse_of(const uint8_t *rgb, uint32_t scale, const struct ladder_vi
 	return sqrt((double)sum / (3.0 * (double)(view->n_covered > 0 ? view->n_covered : 1)));
 }
 
-static int draw(struct calibration *c, struct psr_calibrated *out, const struct ladder_view *view,
+static int draw(struct calibration *c, struct psr_calibrated_fine *out, const struct ladder_view *view,
                 const struct psr_scene *scene, int r)
 {
 	const struct psr_rung *rung = &psr_ladder[r];
@@ -66,8 +66,10 @@ static int draw(struct calibration *c, struct psr_calibrated *out, const struct 
 			return rc;
 		ms = fmin(ms, (double)(clock_ns() - start) * 1e-6);
 	}
-	out->rmse[r] = (float)rmse_of(c->rgb, rung->scale, view);
-	out->ms[r] = (float)fmax(ms, 1e-6);
+	out->rmse = (float)rmse_of(c->rgb, rung->scale, view);
+	out->ms = (float)fmax(ms, 1e-6);
+	if (r == PSR_RUNG_FINE && frame.report.effect[PSR_EFFECT_FINE].why != PSR_WHY_RAN)
+		out->rmse = out->ms = 0;
 	return PSR_OK;
 }
 
@@ -86,7 +88,8 @@ static int see(struct calibration *c, struct psr_calibrated *out, const struct l
 	return PSR_OK;
 }
 
-static int measure_view(struct calibration *c, struct psr_calibrated *out, struct ladder_view *view)
+static int measure_view(struct calibration *c, struct psr_calibrated *out, struct psr_calibrated_fine *fine,
+                        struct ladder_view *view)
 {
 	const struct psr_instance instance = { .model = c->model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	struct psr_scene scene;
@@ -95,12 +98,21 @@ static int measure_view(struct calibration *c, struct psr_calibrated *out, struc
 	ladder_scene(&scene, view, &instance);
 	if (rc == PSR_OK)
 		rc = see(c, out, view, &scene);
-	for (int r = 0; r < PSR_RUNGS && rc == PSR_OK; r++)
-		rc = draw(c, out, view, &scene, r);
+	for (int r = 0, in_calb = 0; r < PSR_RUNGS && rc == PSR_OK; r++) {
+		struct psr_calibrated_fine measured;
+
+		rc = draw(c, &measured, view, &scene, r);
+		if (rc == PSR_OK && r == PSR_RUNG_FINE) {
+			*fine = measured;
+		} else if (rc == PSR_OK) {
+			out->rmse[in_calb] = measured.rmse;
+			out->ms[in_calb++] = measured.ms;
+		}
+	}
 	return rc;
 }
 
-static int measure(struct calibration *c, struct psr_calibrated *out)
+static int measure(struct calibration *c, struct psr_calibrated *out, struct psr_calibrated_fine *fine)
 {
 	const struct calibrate_options *options = c->options;
 	int rc = PSR_OK;
@@ -114,7 +126,7 @@ static int measure(struct calibration *c, struct psr_calibrated *out)
 		rc = ladder_views_make(view, n, &c->look, c->err);
 		for (uint32_t i = 0; i < n; i++) {
 			if (rc == PSR_OK)
-				rc = measure_view(c, &out[first + i], &view[i]);
+				rc = measure_view(c, &out[first + i], &fine[first + i], &view[i]);
 			ladder_view_fini(&view[i]);
 			if (options->on_progress != NULL)
 				options->on_progress("calibrate", first + i + 1, options->n_views, options->userdata);
@@ -123,8 +135,8 @@ static int measure(struct calibration *c, struct psr_calibrated *out)
 	return rc;
 }
 
-int calibrate(struct psr_calibrated *view, const struct psr_model *model, const struct psr_mesh *mesh,
-              const struct calibrate_options *options, struct psr_error *err)
+int calibrate(struct psr_calibrated *view, struct psr_calibrated_fine *fine, const struct psr_model *model,
+              const struct psr_mesh *mesh, const struct calibrate_options *options, struct psr_error *err)
 {
 	struct calibration *c = calloc(1, sizeof *c);
 	int rc;
@@ -147,7 +159,7 @@ int calibrate(struct psr_calibrated *view, const struct psr_model *model, const 
 	if (rc == PSR_OK)
 		rc = psr_source_create(&c->look.source, mesh, err);
 	if (rc == PSR_OK)
-		rc = measure(c, view);
+		rc = measure(c, view, fine);
 	psr_source_destroy(c->look.source);
 	psr_truth_destroy(c->look.truth);
 	psr_renderer_destroy(c->renderer);

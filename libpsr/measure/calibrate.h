@@ -15,9 +15,9 @@ struct calibrate_options {
 	void *userdata;
 };
 
-/* Measures a model with blocks that was built from the mesh. view: n_views. Errors are those of 1 thread or many; times
+/* Measures a model with blocks that was built from the mesh. view, fine: n_views each. Errors are those of 1 thread or many; times
  * are this machine's. ARG, MEMORY. */
-int calibrate(struct psr_calibrated *view, const struct psr_model *model, const struct psr_mesh *mesh,
-              const struct calibrate_options *options, struct psr_error *err);
+int calibrate(struct psr_calibrated *view, struct psr_calibrated_fine *fine, const struct psr_model *model,
+              const struct psr_mesh *mesh, const struct calibrate_options *options, struct psr_error *err);
 
 #endif

@@ -2,9 +2,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include "file.h"
+#include "psr/render.h"
 
 _Static_assert(sizeof(struct psr_calibrated) == CALIBRATED_BYTES && offsetof(struct psr_calibrated, rmse) == 16
                && offsetof(struct psr_calibrated, ms) == 56, "section CALB");
+_Static_assert(sizeof(struct psr_calibrated_fine) == 8 && offsetof(struct psr_calibrated_fine, ms) == 4, "section CALF");
 
 #define MOST 1e9f /* of any value */
 
@@ -22,11 +24,24 @@ const struct psr_rung psr_ladder[PSR_RUNGS] = {
 	{ .scale = 1, .spacing_px = 1.5 },
 	{ .scale = 1, .spacing_px = 1 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1 },
+	[PSR_RUNG_FINE] = { .scale = 1, .spacing_px = 1, .smooth = PSR_SMOOTH_FINE },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 1 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 2 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 3 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 4 },
 };
+
+static int validate_fine(const struct psr_calibration *calibration, struct psr_error *err)
+{
+	for (uint32_t i = 0; calibration->fine != NULL && i < calibration->n; i++) {
+		const struct psr_calibrated_fine *f = &calibration->fine[i];
+
+		if (!(f->rmse >= 0 && f->rmse <= MOST && f->ms >= 0 && f->ms <= MOST))
+			return psr_fail(err, PSR_ERR_FORMAT, "view %" PRIu32 ", fine: an error of %g in %g ms", i, (double)f->rmse,
+			                (double)f->ms);
+	}
+	return PSR_OK;
+}
 
 int calibration_validate(const struct psr_calibration *calibration, struct psr_error *err)
 {
@@ -38,12 +53,12 @@ int calibration_validate(const struct psr_calibration *calibration, struct psr_e
 			                (double)v->apart, (double)v->layers);
 		if (v->zero != 0)
 			return psr_fail(err, PSR_ERR_FORMAT, "view %" PRIu32 ": unused bytes are not zero", i);
-		for (int r = 0; r < PSR_RUNGS; r++)
+		for (int r = 0; r < PSR_RUNGS_CALB; r++)
 			if (!(v->rmse[r] >= 0 && v->rmse[r] <= MOST && v->ms[r] > 0 && v->ms[r] <= MOST))
 				return psr_fail(err, PSR_ERR_FORMAT, "view %" PRIu32 ", rung %d: an error of %g in %g ms", i, r,
 				                (double)v->rmse[r], (double)v->ms[r]);
 	}
-	return PSR_OK;
+	return validate_fine(calibration, err);
 }
 
 struct weighed {
@@ -92,28 +107,50 @@ static double quantile(struct weighed *list, uint32_t n, double part)
 	return list[n - 1].value;
 }
 
-static double foresee(const struct psr_calibration *calibration, const struct psr_calibrated *like, size_t values,
-                      double part)
+struct psr_measured psr_calibration_at(const struct psr_calibration *calibration, uint32_t view, int rung)
 {
-	struct weighed list[PSR_MAX_CALIBRATED];
+	const int in_calb = rung < PSR_RUNG_FINE ? rung : rung - 1;
+
+	if (rung != PSR_RUNG_FINE)
+		return (struct psr_measured){ (double)calibration->view[view].rmse[in_calb],
+			                          (double)calibration->view[view].ms[in_calb] };
+	if (calibration->fine == NULL)
+		return (struct psr_measured){ 0, 0 };
+	return (struct psr_measured){ (double)calibration->fine[view].rmse, (double)calibration->fine[view].ms };
+}
+
+/* Of all views that were measured with the rung. Returns how many. */
+static uint32_t list_measured(struct weighed rmse[PSR_MAX_CALIBRATED], struct weighed ms[PSR_MAX_CALIBRATED],
+                              const struct psr_calibration *calibration, const struct psr_calibrated *like, int rung)
+{
+	uint32_t n = 0;
 
 	for (uint32_t i = 0; i < calibration->n; i++) {
-		float value;
+		const struct psr_measured at = psr_calibration_at(calibration, i, rung);
+		const double weight = weight_of(&calibration->view[i], like);
 
-		memcpy(&value, (const char *)&calibration->view[i] + values, sizeof value);
-		list[i] = (struct weighed){ (double)value, weight_of(&calibration->view[i], like) };
+		if (!(at.ms > 0))
+			continue;
+		rmse[n] = (struct weighed){ at.rmse, weight };
+		ms[n++] = (struct weighed){ at.ms, weight };
 	}
-	return quantile(list, calibration->n, part);
+	return n;
 }
 
 double psr_calibration_rmse(const struct psr_calibration *calibration, const struct psr_calibrated *like, int rung)
 {
-	return foresee(calibration, like, offsetof(struct psr_calibrated, rmse) + (size_t)rung * sizeof(float), UPPER);
+	struct weighed rmse[PSR_MAX_CALIBRATED], ms[PSR_MAX_CALIBRATED];
+	const uint32_t n = list_measured(rmse, ms, calibration, like, rung);
+
+	return n > 0 ? quantile(rmse, n, UPPER) : INFINITY;
 }
 
 double psr_calibration_ms(const struct psr_calibration *calibration, const struct psr_calibrated *like, int rung)
 {
-	return foresee(calibration, like, offsetof(struct psr_calibrated, ms) + (size_t)rung * sizeof(float), 0.5);
+	struct weighed rmse[PSR_MAX_CALIBRATED], ms[PSR_MAX_CALIBRATED];
+	const uint32_t n = list_measured(rmse, ms, calibration, like, rung);
+
+	return n > 0 ? quantile(ms, n, 0.5) : 0;
 }
 
 const struct psr_calibration *psr_model_calibration(const struct psr_model *model)

@@ -47,7 +47,8 @@ enum section_count {
 enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY,
 	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, SECTION_END_OF_OCTREE = 31,
 	              SECTION_CALIBRATION = 31, SECTION_POINTS, SECTION_FIRST_OF_POINTS, SECTION_FIRST_OF_SCAN = 35,
-	              N_KNOWN_SECTIONS = 40 };
+	              SECTION_END_OF_SCAN = 40,
+	              SECTION_CALIBRATION_FINE = 40, N_KNOWN_SECTIONS };
 
 struct section_spec {
 	char type[5];
@@ -63,6 +64,7 @@ struct section_spec {
 #define LIGHT_BYTES 168
 #define OCTREE_BYTES 64
 #define CALIBRATED_BYTES 96
+#define CALIBRATED_FINE_BYTES 8
 #define POINTS_BYTES 16
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
@@ -181,7 +183,7 @@ int model_validate(const struct content *content, struct psr_pool *pool, const c
 /* Checks CAMS and LGTS for model_validate(); *section: the broken one on failure. */
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
 
-int calibration_validate(const struct psr_calibration *calibration, struct psr_error *err); /* the values of CALB */
+int calibration_validate(const struct psr_calibration *calibration, struct psr_error *err); /* the values of CALB, CALF */
 
 /* Check a tree for psr_model_create() and model_validate(): what its arrays are, and what is in them. */
 int model_check_octree_counts(const struct octree *tree, const char *name, struct psr_error *err);

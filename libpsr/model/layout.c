@@ -64,6 +64,8 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	TREE("ORET", COUNT_LEAVES, 1, scan.returns),
 	TREE("OTIM", COUNT_LEAVES, 4, scan.time),
 	TREE("OTSC", COUNT_ONE, 16, scan.time_scale),
+	[SECTION_CALIBRATION_FINE] = { "CALF", 1, 0, COUNT_CALIBRATED, CALIBRATED_FINE_BYTES,
+	                               offsetof(struct content, calibration) + offsetof(struct psr_calibration, fine) },
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -119,6 +121,8 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 {
 	const ptrdiff_t k = spec - section_table;
 
+	if (k == SECTION_CALIBRATION_FINE)
+		return !content->has_blocks;
 	if (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN)
 		return !content->has_points;
 	if ((k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE) || k >= SECTION_FIRST_OF_SCAN)
@@ -284,7 +288,7 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 /* The first version that knows all sections. */
 static unsigned minor_of(const struct content *content)
 {
-	for (int k = SECTION_FIRST_OF_SCAN; k < N_KNOWN_SECTIONS; k++)
+	for (int k = SECTION_FIRST_OF_SCAN; k < SECTION_END_OF_SCAN; k++)
 		if (is_present(k, content))
 			return FILE_MINOR_SCAN;
 	return content->has_points ? FILE_MINOR_POINTS : content->has_octree ? FILE_MINOR_OCTREE : FILE_MINOR;

@@ -230,7 +230,7 @@ static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8
 static int has_scan(const uint8_t *image)
 {
 	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++)
-		for (int k = SECTION_FIRST_OF_SCAN; k < N_KNOWN_SECTIONS; k++)
+		for (int k = SECTION_FIRST_OF_SCAN; k < SECTION_END_OF_SCAN; k++)
 			if (file_is_section(image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i, k))
 				return 1;
 	return 0;

@@ -306,7 +306,8 @@ static int check_set(const struct reader *r, const struct content *content)
 {
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
-		const char *first = k < SECTION_OCTREE ? "BLKS" : k < SECTION_POINTS || k >= SECTION_FIRST_OF_SCAN ? "OCTR" : "DPNT";
+		const int is_of_blocks = k < SECTION_OCTREE || k == SECTION_CALIBRATION_FINE;
+		const char *first = is_of_blocks ? "BLKS" : k < SECTION_POINTS || k >= SECTION_FIRST_OF_SCAN ? "OCTR" : "DPNT";
 
 		if (section_is_foreign(spec, content) && r->entry[k] >= 0)
 			return bad(r, "section %s is there, and %s, which tells its length, is missing", spec->type, first);
@@ -320,6 +321,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 {
 	struct psr_blocks *blocks = &content->blocks;
 
+	if (r->entry[SECTION_CALIBRATION_FINE] >= 0 && content->calibration.n == 0)
+		return bad(r, "section CALF needs CALB, which is missing");
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const void *array;

@@ -104,7 +104,7 @@ int unpack_read_octree(const struct unpacker *u, uint8_t *bytes, uint64_t n)
 }
 
 /* Compares lengths of known sections with the counts in BLKS, OCTR and DPNT before allocating; file_parse() reports other
- * errors better. */
+ * errors better, that of CALF among them. */
 static int check_lengths(struct unpacker *u)
 {
 	struct counts counts = { .has_blocks = 0 };
@@ -136,7 +136,8 @@ static int check_lengths(struct unpacker *u)
 		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS && code == PSR_OK; k++) {
 			const struct section_spec *spec = &section_table[k];
 
-			if (spec->pointer != 0 && !section_is_foreign(spec, &content) && memcmp(unpack_entry(u, i), spec->type, 4) == 0
+			if (spec->pointer != 0 && spec->count != COUNT_CALIBRATED && !section_is_foreign(spec, &content)
+			    && memcmp(unpack_entry(u, i), spec->type, 4) == 0
 			    && file_get(unpack_entry(u, i) + ENTRY_VERSION, 2) == spec->version
 			    && length != spec->item_bytes * section_items(spec, &content))
 				code = bad(u, "section %s has %" PRIu64 " bytes and should have %" PRIu64, spec->type, length,

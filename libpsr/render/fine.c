@@ -17,7 +17,7 @@ static int is_all_splats(const struct psr_scene *scene, const struct render_sett
 	return settings->with_ewa;
 }
 
-static double most_apart(const struct psr_scene *scene)
+double fine_most_apart(const struct psr_scene *scene)
 {
 	for (uint32_t i = 0; i < scene->n_instances; i++)
 		if (instance_drawn_as(&scene->instance[i]) != PSR_BLOCKS)
@@ -43,6 +43,6 @@ int fine_is_worth(int *is_worth, struct surveyor **surveyor, const struct psr_sc
 	if (known < 0) /* no picture may depend on the memory that is left */
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a fine picture");
 	/* A scene of too many clusters for a survey is taken for one of samples enough. */
-	*is_worth = known == 0 || survey.apart <= most_apart(scene);
+	*is_worth = known == 0 || survey.apart <= fine_most_apart(scene);
 	return PSR_OK;
 }

@@ -10,4 +10,8 @@
 int fine_is_worth(int *is_worth, struct surveyor **surveyor, const struct psr_scene *scene,
                   const struct render_settings *settings, struct psr_error *err);
 
+/* Pixels between samples of level 0, in the root mean square of a view, up to which fine_is_worth() says so; of a scene
+ * without splats. */
+double fine_most_apart(const struct psr_scene *scene);
+
 #endif

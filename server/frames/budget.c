@@ -7,7 +7,7 @@
 const struct psr_msg_settings budget_ladder[BUDGET_RUNGS] = {
 	{ .scale = 4, .spacing_px = 1 }, { .scale = 2, .spacing_px = 1 },
 	{ .scale = 1, .spacing_px = 2 }, { .scale = 1, .spacing_px = 1.5 }, { .scale = 1, .spacing_px = 1 },
-	{ .scale = 1, .spacing_px = 1, .smooth = 1 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1 }, { .scale = 1, .spacing_px = 1, .smooth = PSR_SMOOTH_FINE },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 1 }, { .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 2 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 3 }, { .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 4 },
 };
@@ -23,6 +23,8 @@ static int is_offered(const struct psr_msg_settings *rung, const struct budget_v
 		return 0;
 	if (rung->pass > 0)
 		return can_refine(view->planes);
+	if (rung->smooth == PSR_SMOOTH_FINE && !(view->can_be_fine && can_refine(view->planes)))
+		return 0;
 	return !rung->smooth || view->planes >> PSR_PLANE_COLOR & 1; /* smoothing changes colour alone */
 }
 
@@ -42,9 +44,14 @@ int budget_rung_of(const struct psr_msg_settings *settings)
 	return -1;
 }
 
+unsigned budget_doublings(const struct psr_msg_settings *settings)
+{
+	return settings->pass > 0 ? settings->pass : settings->smooth == PSR_SMOOTH_FINE;
+}
+
 double budget_density(const struct psr_msg_settings *settings)
 {
-	return ldexp(1, settings->pass) / settings->scale;
+	return ldexp(1, (int)budget_doublings(settings)) / settings->scale;
 }
 
 void budget_densities(double density[BUDGET_RUNGS])
@@ -76,8 +83,8 @@ static void set_price(struct budget_price *price, const struct budget_learnt *le
 {
 	price->settings = budget_ladder[rung];
 	price->ns = budget_foresee(learnt, view, rung);
-	price->has_rmse = view->is_calibrated;
-	price->rmse = view->rmse[rung];
+	price->has_rmse = view->is_calibrated && isfinite(view->rmse[rung]);
+	price->rmse = price->has_rmse ? view->rmse[rung] : 0;
 }
 
 static void set_choice(struct budget_choice *choice, const struct budget_learnt *learnt, const struct budget_view *view,

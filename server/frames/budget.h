@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include "psr/message.h"
 
-#define BUDGET_RUNGS 10
+#define BUDGET_RUNGS 11
 
 enum budget_work {
 	BUDGET_SAMPLES,   /* plan, cull, warp: of samples, blocks that are tested and pixels; without a pass */
@@ -32,8 +32,9 @@ struct budget_view {
 	double area; /* pixels of the picture that models cover */
 	struct budget_counts at[BUDGET_RUNGS];
 	unsigned n_shadow_lights;
+	int can_be_fine; /* a fine picture is none of another kind: render/fine.h */
 	int is_calibrated; /* rmse and ms have what calibrations of the scene's models foresee: */
-	double rmse[BUDGET_RUNGS]; /* codes of sRGB */
+	double rmse[BUDGET_RUNGS]; /* codes of sRGB; INFINITY: unknown */
 	double ms[BUDGET_RUNGS];   /* of some machine: to be compared with each other; 0: unknown */
 	struct psr_msg_settings kept; /* of the flow's last frame if it drew this scene: its maps stand; or scale 0 */
 };
@@ -112,6 +113,7 @@ unsigned budget_most_pass(const struct psr_msg_frame *request); /* that may be c
 
 extern const struct psr_msg_settings budget_ladder[BUDGET_RUNGS];
 int budget_rung_of(const struct psr_msg_settings *settings); /* -1: none */
+unsigned budget_doublings(const struct psr_msg_settings *settings); /* of a picture's sides: passes, fine pictures */
 double budget_density(const struct psr_msg_settings *settings); /* drawn pixels beside each other in one of the whole */
 double budget_foresee(const struct budget_learnt *learnt, const struct budget_view *view, int rung); /* ns */
 

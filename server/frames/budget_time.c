@@ -33,6 +33,7 @@ static void work_of(double work[BUDGET_N_WORK], const struct budget_view *view, 
 	const double n_pixels = (double)view->width * view->height, density = budget_density(settings);
 	const double drawn = n_pixels * density * density;
 	const double lit = least(covered, drawn) * (1 + SHADOW * view->n_shadow_lights);
+	const unsigned doublings = budget_doublings(settings);
 
 	memset(work, 0, BUDGET_N_WORK * sizeof *work);
 	if (settings->pass > 0) {
@@ -44,8 +45,8 @@ static void work_of(double work[BUDGET_N_WORK], const struct budget_view *view, 
 		work[BUDGET_SMOOTH] = settings->smooth ? EMPTY_PIXEL * drawn + least(covered, drawn) : 0;
 	}
 	work[BUDGET_ANSWER] = n_pixels / (settings->scale * settings->scale);
-	if (settings->scale != view->kept.scale || settings->pass != view->kept.pass)
-		work[BUDGET_SHADOWS] = view->n_shadow_lights * (settings->pass > 0 ? SUBPIXEL_MAP : 1.0)
+	if (settings->scale != view->kept.scale || doublings != budget_doublings(&view->kept))
+		work[BUDGET_SHADOWS] = view->n_shadow_lights * (doublings > 0 ? SUBPIXEL_MAP : 1.0)
 		                       / (settings->scale * sqrt(settings->scale));
 }
 
@@ -135,15 +136,15 @@ static double ratio_of(const struct budget_past *past, const struct budget_ratio
 	return sorted[i].ratio * (1 + MARGIN / n);
 }
 
-/* The nearest rung that has frames; -1: none. */
-static int known_near(const struct budget_learnt *learnt, int rung, int is_any_kind)
+/* The nearest rung that has frames, of the same kind unless it is known how their times compare; -1: none. */
+static int known_near(const struct budget_learnt *learnt, const struct budget_view *view, int rung)
 {
 	for (int apart = 0; apart < BUDGET_RUNGS; apart++)
 		for (int sign = -1; sign <= 1; sign += 2) {
 			const int i = rung + sign * apart;
 
 			if (i >= 0 && i < BUDGET_RUNGS && learnt->past[i].n > 0
-			    && (is_any_kind || !budget_ladder[i].pass == !budget_ladder[rung].pass))
+			    && ((view->ms[rung] > 0 && view->ms[i] > 0) || !budget_ladder[i].pass == !budget_ladder[rung].pass))
 				return i;
 		}
 	return -1;
@@ -153,8 +154,8 @@ static int known_near(const struct budget_learnt *learnt, int rung, int is_any_k
  * slow as the neighbour of its kind, by its own work. */
 double budget_foresee(const struct budget_learnt *learnt, const struct budget_view *view, int rung)
 {
-	const int is_calibrated = view->ms[rung] > 0, known = known_near(learnt, rung, is_calibrated);
-	const int is_scaled = is_calibrated && known >= 0 && known != rung;
+	const int known = known_near(learnt, view, rung);
+	const int is_scaled = known >= 0 && known != rung && view->ms[rung] > 0 && view->ms[known] > 0;
 	double work[BUDGET_N_WORK], ns;
 
 	foresee_work(work, view, is_scaled ? known : rung);

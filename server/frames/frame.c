@@ -168,7 +168,7 @@ void frame_learn(struct frame *frame, struct budget_learnt *of_all)
 	struct drawing *d = &frame->drawing;
 
 	d->spent.total_ns = (double)(clock_ns() - d->start_ns);
-	if (d->refine > 0 || d->settings.splats || d->settings.smooth == PSR_SMOOTH_FINE) /* budgets choose none */
+	if (d->refine > 0 || d->settings.splats) /* budgets choose none */
 		return;
 	budget_learn(&frame_flow(frame)->learnt, &d->seen, d->is_seen, &d->settings, &d->spent);
 	budget_learn(of_all, &d->seen, d->is_seen, &d->settings, &d->spent);

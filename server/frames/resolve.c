@@ -1,6 +1,7 @@
 #include <math.h>
 #include "model/blocks.h"
 #include "model/calibration.h"
+#include "render/fine.h"
 #include "render/survey.h"
 #include "resolve.h"
 
@@ -55,13 +56,18 @@ static void foresee(struct budget_view *view, const struct scene *scene, const s
 	view->is_calibrated = scene_check_calibrated(scene, NULL) == PSR_OK;
 	if (!view->is_calibrated || (sight != NULL && sight->apart == 0)) /* nothing in view has no error */
 		return;
-	for (uint32_t m = 0; m < scene->n_models; m++) {
-		const struct psr_calibration *calibration = psr_model_calibration(scene->model[m]->model);
+	for (int i = 0; i < BUDGET_RUNGS; i++) {
+		int is_known = 1;
 
-		for (int i = 0; i < BUDGET_RUNGS; i++) {
+		for (uint32_t m = 0; m < scene->n_models; m++) {
+			const struct psr_calibration *calibration = psr_model_calibration(scene->model[m]->model);
+			const double ms = psr_calibration_ms(calibration, sight != NULL ? &like : NULL, i);
+
 			view->rmse[i] = fmax(view->rmse[i], psr_calibration_rmse(calibration, sight != NULL ? &like : NULL, i));
-			view->ms[i] += psr_calibration_ms(calibration, sight != NULL ? &like : NULL, i);
+			view->ms[i] += ms;
+			is_known &= ms > 0;
 		}
+		view->ms[i] = is_known ? view->ms[i] : 0;
 	}
 }
 
@@ -82,6 +88,7 @@ static void see(struct budget_view *view, const struct drawing *d, struct survey
 		return;
 	}
 	view->area = survey.area;
+	view->can_be_fine = survey.apart <= fine_most_apart(&scene);
 	for (int i = 0; i < BUDGET_RUNGS; i++)
 		view->at[i] = (struct budget_counts){ survey.at[i].n_blocks, survey.at[i].n_samples, survey.at[i].spread };
 	foresee(view, d->scene, &survey);

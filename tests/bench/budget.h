@@ -8,7 +8,7 @@
 #define BUDGET_SIDE 256      /* of pictures */
 #define BUDGET_RESOLUTION 512 /* of models: around views have magnification 1 or less */
 #define BUDGET_VIEWS 8
-#define BUDGET_RUNGS 10      /* of psrd's ladder, which PROTOCOL.md leaves to the server */
+#define BUDGET_RUNGS 11      /* of psrd's ladder, which PROTOCOL.md leaves to the server */
 
 /* ---- budget_link.c ---- */
 

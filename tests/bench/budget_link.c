@@ -11,7 +11,7 @@
 const struct psr_msg_settings budget_rungs[BUDGET_RUNGS] = {
 	{ .scale = 4, .spacing_px = 1 }, { .scale = 2, .spacing_px = 1 },
 	{ .scale = 1, .spacing_px = 2 }, { .scale = 1, .spacing_px = 1.5 }, { .scale = 1, .spacing_px = 1 },
-	{ .scale = 1, .spacing_px = 1, .smooth = 1 },
+	{ .scale = 1, .spacing_px = 1, .smooth = 1 }, { .scale = 1, .spacing_px = 1, .smooth = 2 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 1 }, { .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 2 },
 	{ .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 3 }, { .scale = 1, .spacing_px = 1, .smooth = 1, .pass = 4 },
 };

@@ -54,13 +54,20 @@ static const struct psr_model *open_model(const char *name)
 	return models[i].model;
 }
 
+/* Under the thread sanitizer a way takes as long as all others together without it, and one thread shows it nothing. */
 static void make_ways(void)
 {
-	for (int isa = 0; isa < PSR_N_ISAS; isa++) {
+#ifdef __SANITIZE_THREAD__
+	const int isas = 1, least_threads = 2;
+#else
+	const int isas = PSR_N_ISAS, least_threads = 1;
+#endif
+
+	for (int isa = 0; isa < isas; isa++) {
 		if (!simd_of((enum psr_isa)isa))
 			continue;
 		psr_isa_cap((enum psr_isa)isa);
-		for (int threads = 1; threads <= N_POOLS; threads++) {
+		for (int threads = least_threads; threads <= N_POOLS; threads++) {
 			struct way *way = &ways[n_ways++];
 			*way = (struct way){ .isa = (enum psr_isa)isa, .n_threads = threads };
 			if (psr_renderer_create(&way->renderer, NULL) || psr_pool_create(&way->pool, threads, NULL))

@@ -10,6 +10,7 @@
 #include "dpoint/group.h"
 #include "dpoint/sample.h"
 #include "patches.h"
+#include "tests/unit/lib/threads.h"
 
 static void sample(struct dpoint_surface *surface, const struct dpoint_patch *patch, uint32_t n, float delta)
 {
@@ -390,5 +391,6 @@ int main(void)
 		cmocka_unit_test(of_nothing_nothing_is_chosen),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

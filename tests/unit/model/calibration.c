@@ -15,6 +15,7 @@
 static struct fixture fixture;
 static struct psr_model *plain;
 static struct psr_calibrated view[N];
+static struct psr_calibrated_fine fine[N]; /* of every second view */
 
 /* Magnifications 1/8 to 4, half of them in shadows. */
 static int setup(void **state)
@@ -24,7 +25,9 @@ static int setup(void **state)
 	for (uint32_t i = 0; i < N; i++) {
 		view[i] = (struct psr_calibrated){ .apart = (float)ldexp(1, (int)(i / 2) - 3), .layers = 1.5f,
 			                               .n_shadow_lights = i % 2 };
-		for (int r = 0; r < PSR_RUNGS; r++) {
+		if (i % 2 == 0)
+			fine[i] = (struct psr_calibrated_fine){ (float)(10 + i), (float)(i + 1) * 6.5f };
+		for (int r = 0; r < PSR_RUNGS_CALB; r++) {
 			view[i].rmse[r] = (float)(100 + 10 * i) / (float)(r + 1);
 			view[i].ms[r] = (float)(i + 1) * (float)(r + 1);
 		}
@@ -39,7 +42,7 @@ static int teardown(void **state)
 	return 0;
 }
 
-static const struct psr_calibration all = { N, view };
+static const struct psr_calibration all = { N, view, fine }, old = { N, view, NULL };
 
 static void a_file_keeps_the_calibration(void **state)
 {
@@ -59,12 +62,13 @@ static void a_file_keeps_the_calibration(void **state)
 		assert_int_equal(psr_model_read(&again, path, NULL), PSR_OK);
 		assert_int_equal(psr_model_calibration(again)->n, N);
 		assert_memory_equal(psr_model_calibration(again)->view, view, sizeof view);
+		assert_memory_equal(psr_model_calibration(again)->fine, fine, sizeof fine);
 		assert_int_equal(psr_model_blocks(again)->n_samples, psr_model_blocks(plain)->n_samples);
 		assert_int_equal(psr_model_presets(again)->n_lights, psr_model_presets(plain)->n_lights);
 		psr_model_unref(again);
 	}
 	unlink(path);
-	assert_int_equal(psr_model_calibrate(&again, model, &(struct psr_calibration){ 0, NULL }, NULL), PSR_OK);
+	assert_int_equal(psr_model_calibrate(&again, model, &(struct psr_calibration){ 0 }, NULL), PSR_OK);
 	assert_int_equal(psr_model_calibration(again)->n, 0);
 	psr_model_unref(again);
 	psr_model_unref(model);
@@ -90,10 +94,45 @@ static void what_no_view_has_is_refused(void **state)
 
 		memcpy(copy, view, sizeof copy);
 		memcpy((char *)&copy[3] + spoilt[i].at, &spoilt[i].value, sizeof spoilt[i].value);
-		const struct psr_calibration bad = { N, copy };
+		const struct psr_calibration bad = { N, copy, NULL };
 		assert_int_equal(psr_model_calibrate(&model, plain, &bad, &err), PSR_ERR_FORMAT);
 		assert_non_null(strstr(err.text, "section CALB"));
 		assert_non_null(strstr(err.text, "view 3"));
+	}
+}
+
+/* Files of before know nothing of fine pictures, and some views have none. */
+static void only_views_that_were_measured_tell_of_a_rung(void **state)
+{
+	const int r = PSR_RUNG_FINE;
+	struct psr_model *model;
+
+	(void)state;
+	assert_true(psr_calibration_at(&all, 4, r).rmse == 14 && psr_calibration_at(&all, 5, r).ms == 0);
+	assert_true(psr_calibration_at(&all, 4, r + 1).ms == (double)view[4].ms[r]);
+	assert_true(psr_calibration_at(&all, 4, r - 1).ms == (double)view[4].ms[r - 1]);
+	assert_true(psr_calibration_ms(&all, NULL, r) > 0 && psr_calibration_rmse(&all, NULL, r) <= 20);
+	assert_true(psr_calibration_ms(&old, NULL, r) == 0 && isinf(psr_calibration_rmse(&old, NULL, r)));
+	assert_int_equal(psr_model_calibrate(&model, plain, &old, NULL), PSR_OK);
+	assert_null(psr_model_calibration(model)->fine);
+	psr_model_unref(model);
+}
+
+static void what_no_fine_picture_has_is_refused(void **state)
+{
+	static const struct psr_calibrated_fine spoilt[] = { { -1, 1 }, { NAN, 1 }, { 1, -1 }, { 1, INFINITY } };
+
+	(void)state;
+	for (size_t i = 0; i < sizeof spoilt / sizeof *spoilt; i++) {
+		struct psr_calibrated_fine copy[N];
+		struct psr_model *model;
+		struct psr_error err;
+
+		memcpy(copy, fine, sizeof copy);
+		copy[3] = spoilt[i];
+		assert_int_equal(psr_model_calibrate(&model, plain, &(struct psr_calibration){ N, view, copy }, &err),
+		                 PSR_ERR_FORMAT);
+		assert_non_null(strstr(err.text, "view 3, fine"));
 	}
 }
 
@@ -105,10 +144,10 @@ static void too_many_views_are_refused(void **state)
 	(void)state;
 	for (size_t i = 0; i <= PSR_MAX_CALIBRATED; i++)
 		many[i] = view[0];
-	assert_int_equal(psr_model_calibrate(&model, plain, &(struct psr_calibration){ PSR_MAX_CALIBRATED, many }, NULL),
-	                 PSR_OK);
+	const struct psr_calibration most = { PSR_MAX_CALIBRATED, many, NULL };
+	assert_int_equal(psr_model_calibrate(&model, plain, &most, NULL), PSR_OK);
 	psr_model_unref(model);
-	const struct psr_calibration over = { PSR_MAX_CALIBRATED + 1, many };
+	const struct psr_calibration over = { PSR_MAX_CALIBRATED + 1, many, NULL };
 	assert_int_equal(psr_model_calibrate(&model, plain, &over, NULL), PSR_ERR_LIMIT);
 }
 
@@ -117,7 +156,7 @@ static void too_many_views_are_refused(void **state)
 static void similar_views_count_most(void **state)
 {
 	struct psr_calibrated far = view[0], near = view[10];
-	const struct psr_calibration two = { 3, (const struct psr_calibrated[]){ view[0], view[4], view[10] } };
+	const struct psr_calibration two = { 3, (const struct psr_calibrated[]){ view[0], view[4], view[10] }, NULL };
 
 	(void)state;
 	far.layers = near.layers = 1.5f;
@@ -137,7 +176,7 @@ static void nine_views_of_ten_are_within_the_error(void **state)
 		alike[i] = view[6];
 		alike[i].rmse[5] = (float)(1 + i * 17 % 40);
 	}
-	const double foreseen = psr_calibration_rmse(&(struct psr_calibration){ 40, alike }, &view[6], 5);
+	const double foreseen = psr_calibration_rmse(&(struct psr_calibration){ 40, alike, NULL }, &view[6], 5);
 	for (int i = 0; i < 40; i++)
 		n_over += (double)alike[i].rmse[5] > foreseen;
 	assert_int_equal(n_over, 4);
@@ -148,6 +187,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_file_keeps_the_calibration),
 		cmocka_unit_test(what_no_view_has_is_refused),
+		cmocka_unit_test(only_views_that_were_measured_tell_of_a_rung),
+		cmocka_unit_test(what_no_fine_picture_has_is_refused),
 		cmocka_unit_test(too_many_views_are_refused),
 		cmocka_unit_test(similar_views_count_most),
 		cmocka_unit_test(nine_views_of_ten_are_within_the_error),

@@ -11,6 +11,7 @@
 #include "../octree/leaves.h"
 #include "fixture.h"
 #include "sections.h"
+#include "tests/unit/lib/threads.h"
 
 #define LEVELS 7
 
@@ -340,5 +341,6 @@ int main(void)
 		cmocka_unit_test(a_file_cut_at_any_place_is_refused),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include "octree/pack.h"
 #include "leaves.h"
+#include "tests/unit/lib/threads.h"
 
 static struct octree *make(int levels, size_t n_random)
 {
@@ -221,5 +222,6 @@ int main(void)
 		cmocka_unit_test(a_tree_takes_only_its_own_bytes),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

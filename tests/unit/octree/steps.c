@@ -6,6 +6,7 @@
 #include <string.h>
 #include "octree/pack.h"
 #include "leaves.h"
+#include "tests/unit/lib/threads.h"
 
 struct packed {
 	struct octree *tree;
@@ -217,5 +218,6 @@ int main(void)
 		cmocka_unit_test(a_damaged_step_is_refused_or_another_tree),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "base/direction.h"
 #include "leaves.h"
+#include "tests/unit/lib/threads.h"
 
 static const struct {
 	int levels;
@@ -271,5 +272,6 @@ int main(void)
 		cmocka_unit_test(threads_find_the_first_fault),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,6 +17,7 @@
 #include "simd/isa.h"
 #include "render/stages.h"
 #include "tests/unit/lib/shapes.h"
+#include "tests/unit/lib/threads.h"
 
 #define FLUSH_AND_DAZ 0x8040u /* of MXCSR: results and operands that are denormal count as 0 */
 
@@ -201,5 +202,6 @@ int main(void)
 		cmocka_unit_test(a_frame_leaves_the_callers_environment_as_it_was),
 		cmocka_unit_test(threads_do_not_show_where_tiles_are_narrow),
 	};
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include "base/maths.h"
 #include "render/render.h"
 #include "tests/unit/lib/trees.h"
+#include "tests/unit/lib/threads.h"
 
 #define SIDE 160
 #define RADIUS 0.9
@@ -223,5 +224,6 @@ int main(void)
 		cmocka_unit_test(discs_and_splats_exclude_each_other),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

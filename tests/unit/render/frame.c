@@ -11,6 +11,7 @@
 #include "base/vec.h"
 #include "render/stages.h"
 #include "tests/unit/lib/shapes.h"
+#include "tests/unit/lib/threads.h"
 
 struct picture { /* owns its planes */
 	struct psr_frame frame;
@@ -670,5 +671,6 @@ int main(void)
 		cmocka_unit_test(framing_shows_the_whole_box),
 		cmocka_unit_test(views_from_the_front_are_what_formats_call_it),
 	};
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,6 +11,7 @@
 #include "model/cubes.h"
 #include "render/stages.h"
 #include "tests/unit/lib/trees.h"
+#include "tests/unit/lib/threads.h"
 
 #define SIDE 160
 #define RADIUS 0.9
@@ -409,5 +410,6 @@ int main(void)
 		cmocka_unit_test(a_report_says_what_was_drawn_and_how_deep),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

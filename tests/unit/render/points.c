@@ -13,6 +13,7 @@
 #include "render/stages.h"
 #include "tests/unit/lib/lines.h"
 #include "tests/unit/lib/points.h"
+#include "tests/unit/lib/threads.h"
 
 #define SIDE 256
 #define RADIUS 0.8
@@ -365,5 +366,6 @@ int main(void)
 		cmocka_unit_test(points_cast_shadows_and_receive_them),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, setup, teardown);
 }

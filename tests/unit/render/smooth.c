@@ -12,6 +12,7 @@
 #include "base/pool.h"
 #include "render/plan.h"
 #include "tests/unit/lib/shapes.h"
+#include "tests/unit/lib/threads.h"
 
 #define SIDE 7
 
@@ -289,5 +290,6 @@ int main(void)
 		cmocka_unit_test(the_rim_of_a_sphere_is_three_times_as_true),
 		cmocka_unit_test(a_grazed_plane_is_one_surface),
 	};
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

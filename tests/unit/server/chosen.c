@@ -16,13 +16,20 @@ static struct peer p;
 static void calibrated_write(void)
 {
 	struct psr_calibrated view = { .apart = 1, .layers = 1 };
-	const struct psr_calibration calibration = { 1, &view };
+	struct psr_calibrated_fine fine;
+	const struct psr_calibration calibration = { 1, &view, &fine };
 	struct psr_model *plain, *calibrated;
 	char path[2 * PATH_MAX];
 
-	for (int i = 0; i < PSR_RUNGS; i++) {
-		view.rmse[i] = (float)ldexp(64, -i);
-		view.ms[i] = (float)(i + 1);
+	for (int i = 0, in_calb = 0; i < PSR_RUNGS; i++) {
+		const float rmse = (float)ldexp(64, -i), ms = (float)(i + 1);
+
+		if (i == PSR_RUNG_FINE) {
+			fine = (struct psr_calibrated_fine){ rmse, ms };
+		} else {
+			view.rmse[in_calb] = rmse;
+			view.ms[in_calb++] = ms;
+		}
 	}
 	snprintf(path, sizeof path, "%s/plate.psr", folder);
 	assert_int_equal(psr_model_read(&plain, path, NULL), PSR_OK);

@@ -8,6 +8,7 @@
 #include <string.h>
 #include "base/random.h"
 #include "model/calibration.h"
+#include "psr/render.h"
 #include "server/frames/budget.h"
 
 #define MS 1e6
@@ -16,18 +17,19 @@
 #define N_SAMPLES 4e6 /* its samples, */
 #define N_BLOCKS 1e5  /* and its blocks */
 
-static struct budget_view whole = { .width = 640, .height = 480, .planes = 1 << PSR_PLANE_COLOR, .area = AREA };
+static struct budget_view whole = { .width = 640, .height = 480, .planes = 1 << PSR_PLANE_COLOR, .area = AREA,
+	                               .can_be_fine = 1 };
 
 /* A machine: what a unit of work takes, and how much a frame's time spreads. */
 struct machine {
-	double sample, pixel, smooth, answer; /* ns */
+	double sample, splat, pixel, smooth, answer; /* ns */
 	double load, spread;                  /* factor on all; a frame takes up to 1 + spread times as long */
 	uint64_t random;
 };
 
 static double density(const struct psr_msg_settings *s)
 {
-	return ldexp(1, s->pass) / s->scale;
+	return ldexp(1, s->pass > 0 ? s->pass : s->smooth == PSR_SMOOTH_FINE) / s->scale;
 }
 
 /* Coarse models: a sample counts as of the next power of two of the spacing. */
@@ -60,7 +62,8 @@ static void draw(struct budget_spent *spent, struct machine *m, const struct bud
 	spent->n_samples = samples_of(s);
 	spent->n_blocks = N_BLOCKS;
 	spent->n_covered = AREA * density(s) * density(s);
-	spent->ns[s->pass > 0 ? BUDGET_SPLATS : BUDGET_SAMPLES] = factor * m->sample * samples_of(s);
+	spent->ns[s->pass > 0 ? BUDGET_SPLATS : BUDGET_SAMPLES] =
+		factor * (s->pass > 0 ? m->splat : m->sample) * samples_of(s);
 	spent->ns[s->pass > 0 ? BUDGET_SUBPIXELS : BUDGET_PIXELS] = factor * m->pixel * drawn;
 	spent->ns[BUDGET_SMOOTH] = s->smooth && s->pass == 0 ? factor * m->smooth * drawn : 0;
 	for (int i = 0; i < BUDGET_N_WORK; i++)
@@ -69,8 +72,8 @@ static void draw(struct budget_spent *spent, struct machine *m, const struct bud
 	spent->error_px = 2.5 / density(s);
 }
 
-static const struct machine usual = { .sample = 12, .pixel = 9, .smooth = 4, .answer = 5, .load = 1, .spread = 0.2,
-	                                  .random = 7 };
+static const struct machine usual = { .sample = 12, .splat = 200, .pixel = 9, .smooth = 4, .answer = 5, .load = 1,
+	                                  .spread = 0.2, .random = 7 };
 
 /* Asks for n frames of a budget. Returns how many took longer; *mean_ns: the mean time of a frame. */
 static int run(struct budget_learnt *learnt, struct machine *m, double limit_ns, int n, double *mean_ns)
@@ -225,24 +228,25 @@ static void views_have_prices_of_their_own(void **state)
  */
 static void a_rung_that_was_never_drawn_begins_with_the_calibration(void **state)
 {
-	const struct psr_msg_settings plain = { .scale = 1, .spacing_px = 1 }, *pass = &budget_ladder[7];
+	const struct psr_msg_settings plain = { .scale = 1, .spacing_px = 1 }, *pass = &budget_ladder[8];
 	struct budget_view view = whole;
 	struct machine m = usual;
 	struct budget_learnt learnt;
 	struct budget_spent spent;
 
 	(void)state;
+	m.splat = m.sample;
 	budget_init(&learnt);
 	for (int i = 0; i < 40; i++) {
 		draw(&spent, &m, &whole, &plain);
 		budget_learn(&learnt, &whole, 1, &plain, &spent);
 	}
-	assert_true(budget_foresee(&learnt, &view, 7) > 4 * time_of(&m, pass));
+	assert_true(budget_foresee(&learnt, &view, 8) > 4 * time_of(&m, pass));
 	view.is_calibrated = 1;
 	for (int i = 0; i < BUDGET_RUNGS; i++)
 		view.ms[i] = time_of(&m, &budget_ladder[i]) * 17 / MS; /* of a slower machine */
-	assert_true(budget_foresee(&learnt, &view, 7) < 2 * time_of(&m, pass));
-	assert_true(budget_foresee(&learnt, &view, 7) > time_of(&m, pass) / (1 + m.spread));
+	assert_true(budget_foresee(&learnt, &view, 8) < 2 * time_of(&m, pass));
+	assert_true(budget_foresee(&learnt, &view, 8) > time_of(&m, pass) / (1 + m.spread));
 }
 
 static void what_cannot_be_met_gets_the_nearest_and_says_so(void **state)
@@ -287,6 +291,59 @@ static void only_settings_that_the_picture_takes_are_chosen(void **state)
 	assert_true(choice.chosen.settings.scale == 1 && !choice.chosen.settings.smooth);
 }
 
+/* Where samples are too far apart a fine picture is the smooth one, and the step from smooth goes to pass 1. */
+static void fine_pictures_are_chosen_where_they_differ(void **state)
+{
+	const struct psr_msg_settings fine = { .scale = 1, .spacing_px = 1, .smooth = PSR_SMOOTH_FINE };
+	struct budget_view view = whole;
+	struct budget_learnt learnt;
+	struct budget_choice choice;
+
+	(void)state;
+	budget_init(&learnt);
+	const double limit_ns = budget_foresee(&learnt, &view, budget_rung_of(&fine));
+	budget_choose_time(&choice, &learnt, &view, limit_ns);
+	assert_true(choice.is_met && choice.chosen.settings.smooth == PSR_SMOOTH_FINE && choice.chosen.settings.pass == 0);
+	assert_true(choice.cheaper.settings.smooth == 1 && choice.better.settings.pass == 1);
+	view.can_be_fine = 0;
+	budget_choose_time(&choice, &learnt, &view, limit_ns);
+	assert_true(choice.chosen.settings.smooth == 1 && choice.chosen.settings.pass == 0);
+	assert_true(choice.better.settings.pass == 1);
+	view.can_be_fine = 1;
+	view.planes |= 1 << PSR_PLANE_ID;
+	budget_choose_time(&choice, &learnt, &view, INFINITY);
+	assert_true(choice.chosen.settings.smooth == 1);
+}
+
+/* A calibration of before has no figures of fine pictures: no limit on the error takes them, a time may. */
+static void a_calibration_without_fine_pictures_offers_none(void **state)
+{
+	const int rung = PSR_RUNG_FINE;
+	struct budget_view view = whole;
+	struct budget_learnt learnt;
+	struct budget_choice choice;
+	struct machine m = usual;
+	struct budget_spent spent;
+
+	(void)state;
+	budget_init(&learnt);
+	for (int i = 0; i < 10; i++) {
+		draw(&spent, &m, &whole, &budget_ladder[rung]);
+		budget_learn(&learnt, &whole, 1, &budget_ladder[rung], &spent);
+	}
+	view.is_calibrated = 1;
+	for (int i = 0; i < BUDGET_RUNGS; i++) {
+		view.rmse[i] = i == rung ? INFINITY : ldexp(64, -i);
+		view.ms[i] = i == rung ? 0 : i + 1;
+	}
+	for (int i = 0; i < BUDGET_RUNGS; i++)
+		assert_true(isfinite(budget_foresee(&learnt, &view, i)) && budget_foresee(&learnt, &view, i) > 0);
+	budget_choose_rmse(&choice, &learnt, &view, view.rmse[rung - 1] / 2);
+	assert_true(choice.is_met && choice.chosen.settings.pass >= 1);
+	budget_choose_time(&choice, &learnt, &view, 2 * time_of(&m, &budget_ladder[rung]));
+	assert_true(choice.chosen.settings.smooth == PSR_SMOOTH_FINE && !choice.chosen.has_rmse);
+}
+
 /* The bound of a rung is that of its last frame; coarse models have the same one whatever is drawn. */
 static void an_error_is_foreseen_from_frames(void **state)
 {
@@ -305,8 +362,10 @@ static void an_error_is_foreseen_from_frames(void **state)
 	assert_true(choice.is_met && choice.chosen.settings.scale == 1 && choice.chosen.settings.pass == 0);
 	budget_choose_error(&choice, &learnt, &whole, 1.21);
 	assert_true(choice.is_met && choice.chosen.settings.scale == 2);
-	budget_choose_error(&choice, &learnt, &whole, 0.31);
-	assert_true(choice.is_met && choice.chosen.settings.pass == 1);
+	budget_choose_error(&choice, &learnt, &whole, 0.31); /* as fine as pass 1, and cheaper */
+	assert_true(choice.is_met && choice.chosen.settings.smooth == PSR_SMOOTH_FINE);
+	budget_choose_error(&choice, &learnt, &whole, 0.16);
+	assert_true(choice.is_met && choice.chosen.settings.pass == 2);
 }
 
 /* The cheapest rung within the limit; the best one where none is. */
@@ -378,6 +437,8 @@ int main(void)
 		cmocka_unit_test(a_rung_that_was_never_drawn_begins_with_the_calibration),
 		cmocka_unit_test(what_cannot_be_met_gets_the_nearest_and_says_so),
 		cmocka_unit_test(only_settings_that_the_picture_takes_are_chosen),
+		cmocka_unit_test(fine_pictures_are_chosen_where_they_differ),
+		cmocka_unit_test(a_calibration_without_fine_pictures_offers_none),
 		cmocka_unit_test(an_error_is_foreseen_from_frames),
 		cmocka_unit_test(a_likeness_is_that_of_the_calibration),
 		cmocka_unit_test(the_ladder_is_that_of_calibrations),
