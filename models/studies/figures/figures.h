@@ -119,6 +119,8 @@ struct figure_way {
 	const struct figure_model *model;         /* to draw in place of the model of the truth; or NULL */
 };
 
+void figure_make_smooth(struct figure_shot *shot); /* as programs draw */
+
 #define FIGURE_MOST_WAYS 5
 #define FIGURE_MOST_ROWS 3
 #define FIGURE_FIND UINT32_MAX /* as part.x: where, in whichever view, the first way is worst beside the last one */

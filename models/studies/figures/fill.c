@@ -14,7 +14,7 @@ struct filling {
 	struct figure_model model;
 	struct psr_frame before, after;
 	struct figure_truth truth;
-	struct figure_score score[2]; /* before, after */
+	struct figure_score score[3]; /* before, after, after and smooth */
 	uint64_t n_samples, n_gaps;   /* pixels with a sample; whose weight is below 1 */
 	uint8_t *weights;             /* as greys */
 };
@@ -37,11 +37,17 @@ static void show_gaps(struct filling *f)
 
 static int draw_view(struct study *study, struct filling *f, const double toward[3])
 {
-	struct figure_shot shot;
+	struct figure_shot shot, smooth;
 	int rc;
 
 	figure_shot_init(&shot, &f->model, toward, MAGNIFICATION, SIDE);
+	figure_shot_copy(&smooth, &shot);
+	figure_make_smooth(&smooth);
 	rc = figure_truth_draw(&f->truth, study, &f->model, &shot, RAYS);
+	if (rc == PSR_OK)
+		rc = figure_draw(&f->before, study, &smooth);
+	if (rc == PSR_OK)
+		rc = figure_score_add(&f->score[2], study, &f->model, &smooth, &f->before, &f->truth);
 	if (rc == PSR_OK)
 		rc = figure_draw(&f->after, study, &shot);
 	if (rc == PSR_OK)
@@ -87,6 +93,7 @@ int figure_fill(struct study *study)
 		figure_score_print_head("toybird");
 		figure_score_print("before", &f.score[0]);
 		figure_score_print("after", &f.score[1]);
+		figure_score_print("after, smooth", &f.score[2]);
 		printf("\n%.1f %% of the pixels that have a sample are gaps, wholly or in part.\n",
 		       100.0 * (double)f.n_gaps / (double)f.n_samples);
 	}

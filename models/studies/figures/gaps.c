@@ -25,6 +25,7 @@ int figure_gaps(struct study *study)
 			{ .label = "opaque squares", .change = make_opaque },
 			{ .label = "bilinear coverage", .change = make_bilinear },
 			{ .label = "closed depths" },
+			{ .label = "closed depths, smooth", .change = figure_make_smooth },
 		},
 	};
 
@@ -41,7 +42,8 @@ int figure_threshold(struct study *study)
 	static const struct figure_plan plan = {
 		"threshold", NULL, { 2, 512, 4, figure_view, .n_views = FIGURE_VIEWS }, 256,
 		{ { "toybird", NULL, { FIGURE_FIND, 0, 128, 128, 3 } } },
-		{ { .label = "threshold 0", .change = take_threshold_away }, { .label = "threshold of 3 pixels" } },
+		{ { .label = "threshold 0", .change = take_threshold_away }, { .label = "threshold of 3 pixels" },
+		  { .label = "the same, smooth", .change = figure_make_smooth } },
 	};
 
 	return figure_run(study, &plan);

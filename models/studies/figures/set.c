@@ -72,7 +72,7 @@ static int draw_twice(struct psr_frame *frame, struct study *study, const struct
 	return rc;
 }
 
-static void make_smooth(struct figure_shot *shot)
+void figure_make_smooth(struct figure_shot *shot)
 {
 	shot->settings.smooth = 1;
 }
@@ -98,7 +98,7 @@ int figure_edges(struct study *study)
 		{ { "chair", NULL, { 0, 0, 128, 128, 2 } }, { "toybird", NULL, { 0, 0, 128, 128, 2 } } },
 		{
 			{ .label = "one pass" },
-			{ .label = "smooth", .change = make_smooth },
+			{ .label = "smooth", .change = figure_make_smooth },
 			{ .label = "2x2 sub-pixels", .draw = draw_twice },
 			{ .label = "refined, pass 3", .draw = draw_refined },
 		},
