@@ -274,6 +274,7 @@ EFFECTS    := $(BUILD)/tests/bench/effects
 CANCEL     := $(BUILD)/tests/bench/cancel
 POOL_BENCH := $(BUILD)/tests/bench/pool
 OCTREE_BENCH := $(BUILD)/tests/bench/octree $(BUILD)/tests/bench/octree_draws
+DPOINT_BENCH := $(BUILD)/tests/bench/dpoint_draws
 CODEC_BENCH := $(BUILD)/tests/bench/codec
 DAEMON_BENCH := $(BUILD)/tests/bench/daemon
 REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
@@ -287,8 +288,8 @@ LARGE_OCTREE := $(BUILD)/tests/bench/large_octree
 # Benchmarks run by hand, but are built with the tests, so that they are there when somebody wants to know. FRAMES needs
 # packages that no test needs.
 ifeq ($(config),release)
-TEST_BIN   += $(BENCH) $(EFFECTS) $(CANCEL) $(POOL_BENCH) $(OCTREE_BENCH) $(CODEC_BENCH) $(DAEMON_BENCH) $(REPROJECT_BENCH) $(VIEW_BENCH) \
-	$(LATENCY) $(FIRST) $(TRUTH) $(BUDGET) $(LARGE) $(LARGE_OCTREE)
+TEST_BIN   += $(BENCH) $(EFFECTS) $(CANCEL) $(POOL_BENCH) $(OCTREE_BENCH) $(DPOINT_BENCH) $(CODEC_BENCH) $(DAEMON_BENCH) $(REPROJECT_BENCH) \
+	$(VIEW_BENCH) $(LATENCY) $(FIRST) $(TRUTH) $(BUDGET) $(LARGE) $(LARGE_OCTREE)
 endif
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
@@ -353,7 +354,7 @@ $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/l
 $(BUILD)/tests/bench/octree: $(BUILD)/tests/bench/octree_draco.cc.o
 $(OCTREE_BENCH): %: %.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
-$(POOL_BENCH): $(BUILD)/tests/bench/pool.c.o $(LIB)/libpsr.a
+$(POOL_BENCH) $(DPOINT_BENCH): %: %.c.o $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(CODEC_BENCH): $(BUILD)/tests/bench/codec.c.o $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_PSR)
@@ -395,7 +396,7 @@ $(LARGE_OCTREE): $(BUILD)/tests/bench/large_octree.c.o $(LIB)/libpsr.a
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cancel bench-codec bench-daemon bench-effects bench-model bench-octree bench-pool
+.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cancel bench-codec bench-daemon bench-dpoint bench-effects bench-model bench-octree bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 # PSR_TEST names tests as tests/run does; only what they run is built. Scripts run programs of tests/tools and soak.
@@ -465,6 +466,13 @@ bench-codec: $(CODEC_BENCH) ## bench-codec: what encoding a frame costs beside t
 
 bench-daemon: compile $(DAEMON_BENCH) ## bench-daemon: psrd under many clients beside its targets (args="--only 1,3 --psrd OTHER/psrd --json FILE")
 	$(Q)$(DAEMON_BENCH) $(args) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd
+
+bench-dpoint: compile $(DPOINT_BENCH) ## bench-dpoint: frames of differential points, the teapot's, by instruction set: points a second, frames a second, stages
+	$(Q)mkdir -p $(BUILD)/bench-dpoint
+	$(Q)[ -f $(BUILD)/bench-dpoint/teapot.glb ] || $(BIN)/psr-model make teapot -o $(BUILD)/bench-dpoint/teapot.glb
+	$(Q)[ -f $(BUILD)/bench-dpoint/teapot.psr ] || \
+		$(BIN)/psr-model build $(BUILD)/bench-dpoint/teapot.glb --representation dpoints -r 256 -o $(BUILD)/bench-dpoint/teapot.psr
+	$(Q)$(DPOINT_BENCH) $(BUILD)/bench-dpoint/teapot.psr
 
 bench-effects: compile $(EFFECTS) ## bench-effects: what a light, a highlight, a shadow, an instance, ... costs, one by one; table and picture
 	$(Q)$(EFFECTS) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched)
