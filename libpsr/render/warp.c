@@ -4,7 +4,7 @@
 #define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
 
 #define RUN 1024     /* blocks warped between two questions */
-#define POINTS_RUN 4 /* groups of points, each of which may cover the tile */
+#define POINTS_RUN 256 /* differential points, each of which may cover the tile */
 
 /* The most frequent level above 0 among a tile's blocks; 0 if there is none. */
 static int most_frequent_level(const struct plan *plan, const struct bin_entry *entry, uint32_t n)
@@ -24,7 +24,17 @@ static inline warp_fn *kernel_of(const struct simd *simd, const struct plan *pla
 {
 	const struct warp_instance *in = &plan->warp[entry->instance];
 
-	return in->cubes != NULL ? (plan->with_ewa ? simd->ewa_words : simd->warp_leaves) : in->points != NULL ? simd->warp_points : simd->warp;
+	if (in->points != NULL)
+		return simd->warp_points;
+	return in->cubes == NULL ? simd->warp : plan->with_ewa ? simd->ewa_words : simd->warp_leaves;
+}
+
+/* Of a group of differential points; else 0. */
+static inline uint32_t n_points_of(const struct plan *plan, const struct bin_entry *entry)
+{
+	const struct warp_instance *in = &plan->warp[entry->instance];
+
+	return in->points != NULL ? in->points->model->set->group[entry->slot - in->first_slot].n : 0;
 }
 
 uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
@@ -36,12 +46,17 @@ uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const st
 		return simd->warp(target, entry, n);
 	for (uint32_t first = 0, end = 0; first < n; first = end) {
 		warp_fn *warp = kernel_of(simd, plan, &entry[first]);
-		const uint32_t most = warp == simd->warp_points ? POINTS_RUN : n;
+		uint32_t left = POINTS_RUN;
 
-		if (most < n && plan_is_cancelled(plan))
+		if (warp == simd->warp_points && plan_is_cancelled(plan))
 			break;
-		while (end < n && end - first < most && kernel_of(simd, plan, &entry[end]) == warp)
-			end++;
+		for (; end < n && kernel_of(simd, plan, &entry[end]) == warp; end++) {
+			const uint32_t n_points = n_points_of(plan, &entry[end]);
+
+			if (n_points > left)
+				break;
+			left -= n_points;
+		}
 		n_inside += warp(target, entry + first, end - first);
 	}
 	return n_inside;

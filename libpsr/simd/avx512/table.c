@@ -1,3 +1,4 @@
+#include "points_spread.h"
 #include "simd/loops/table.h"
 
 #define BY_HAND(kernel) kernel##_avx512

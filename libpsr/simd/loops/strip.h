@@ -3,7 +3,7 @@
 #include "base/maths.h"
 #include "base/root.h"
 #include "base/srgb.h"
-#include "points.h"
+#include "points_shade.h"
 #include "strip_parts.h"
 #include "strip_write.h"
 

@@ -22,7 +22,7 @@
 	.warp_cells = warp_cells,                      \
 	.warp = warp_##isa,                            \
 	.warp_leaves = warp_leaves_##isa,              \
-	.warp_points = warp_points,                    \
+	.warp_points = KERNEL(warp_points),            \
 	.ewa_words = ewa_words_##isa,                  \
 	.ewa_sums = ewa_sums_##isa,                    \
 	.veil = veil_##isa,                            \

@@ -1,0 +1,108 @@
+/* Normals of differential points by [K] (6), where the lines of sight meet the quadrics: at the depths of the words. */
+#ifndef PSR_SIMD_LOOPS_POINTS_SHADE_H
+#define PSR_SIMD_LOOPS_POINTS_SHADE_H
+
+#include "points_unpack.h"
+#include "simd/strip.h"
+
+_Static_assert(STRIP <= POINTS_BATCH && STRIP_PADDING <= POINTS_VECTOR, "a strip's points are a batch");
+
+/* Pixels that follow each other often show one point, which is unpacked once. */
+struct points_runs {
+	struct points_unpacked p;
+	uint32_t id[STRIP + 1];
+	float begin[3][POINTS_ROOM];            /* the eye from the point */
+	uint32_t run[STRIP + POINTS_VECTOR];    /* of a pixel */
+	/* By pixel. */
+	float at[3][STRIP + POINTS_VECTOR], axis[3][3][STRIP + POINTS_VECTOR], lambda[2][STRIP + POINTS_VECTOR];
+};
+
+static inline void list_runs(struct points_runs *to, const struct strip_pixels *p, const struct warp_instance *in,
+                             uint32_t first, uint32_t end)
+{
+	const struct warp_points *points = in->points;
+	const struct dpoint_set *set = points->model->set;
+	uint32_t n = 0;
+
+	for (uint32_t i = first; i < end; i++) {
+		n += i > first && p->id[i] != p->id[i - 1];
+		to->id[n] = p->id[i];
+		to->run[i] = n;
+	}
+	to->p.n = n + 1;
+	for (uint32_t r = 0; r <= n; r++) {
+		const struct dpoint_group *g = &set->group[to->id[r] / PSR_BLOCK_SAMPLES - in->first_slot];
+
+		points_list(&to->p, r, points, &set->word[g->first + to->id[r] % PSR_BLOCK_SAMPLES]);
+		for (int c = 0; c < 3; c++) {
+			to->p.step[c][r] = g->box.step[c];
+			to->begin[c][r] = (float)(points->eye[c] - (double)g->box.low[c]);
+		}
+	}
+	points_unpack(&to->p, points);
+	for (int c = 0; c < 3; c++)
+		for (uint32_t r = 0; r <= n; r++)
+			to->begin[c][r] -= to->p.at[c][r];
+}
+
+/* Sets values of pixels to those of their runs. Sets of instructions may have a way of their own, which may write
+ * POINTS_VECTOR values beyond. */
+static inline void points_spread(float *to, const float *from, const uint32_t *run, uint32_t first, uint32_t end)
+{
+	for (uint32_t i = first; i < end; i++)
+		to[i] = from[run[i]];
+}
+
+#ifndef POINTS_SPREAD
+#define POINTS_SPREAD points_spread
+#endif
+
+static inline void spread_runs(struct points_runs *runs, uint32_t first, uint32_t end)
+{
+	for (int k = 0; k < 3; k++) {
+		POINTS_SPREAD(runs->at[k], runs->begin[k], runs->run, first, end);
+		for (int c = 0; c < 3; c++)
+			POINTS_SPREAD(runs->axis[k][c], runs->p.axis[k][c], runs->run, first, end);
+	}
+	for (int k = 0; k < 2; k++)
+		POINTS_SPREAD(runs->lambda[k], runs->p.lambda[k], runs->run, first, end);
+}
+
+static void points_resolve(struct strip *strip, const struct strip_view *view, const struct warp_instance *in,
+                           uint32_t first, uint32_t end)
+{
+	const struct warp_points *points = in->points;
+	const struct strip_pixels *p = strip->pixels;
+	const int perspective = view->perspective;
+	const float y = (float)p->y + 0.5f - points->center[1], center_x = points->center[0];
+	struct points_runs of;
+	float depth[STRIP];
+
+	list_runs(&of, p, in, first, end);
+	spread_runs(&of, first, end);
+	for (uint32_t i = first; i < end; i++)
+		depth[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
+	for (uint32_t i = first; i < end; i++) {
+		const float x = (float)(int32_t)(p->x0 + p->x[i]) + 0.5f - center_x, z = depth[i];
+		const float wide = psr_choose(perspective, z, 1);
+		float away[3], normal[3], n[3], local[2];
+
+		for (int k = 0; k < 3; k++)
+			away[k] = of.at[k][i] + (wide * (x * points->right[k] + y * points->down[k]) + z * points->forward[k]);
+		for (int k = 0; k < 2; k++)
+			local[k] = (of.axis[k][0][i] * away[0] + of.axis[k][1][i] * away[1]) + of.axis[k][2][i] * away[2];
+		dpoint_normal_at(n, of.lambda[0][i], of.lambda[1][i], local[0], local[1]);
+		for (int k = 0; k < 3; k++)
+			normal[k] = (n[0] * of.axis[0][k][i] + n[1] * of.axis[1][k][i]) + of.axis[2][k][i];
+		const float unit = 1 / __builtin_sqrtf((normal[0] * normal[0] + normal[1] * normal[1]) + normal[2] * normal[2]);
+		const float nx = (in->turn[0][0] * normal[0] + in->turn[0][1] * normal[1]) + in->turn[0][2] * normal[2];
+		const float ny = (in->turn[1][0] * normal[0] + in->turn[1][1] * normal[1]) + in->turn[1][2] * normal[2];
+		const float nz = (in->turn[2][0] * normal[0] + in->turn[2][1] * normal[1]) + in->turn[2][2] * normal[2];
+
+		strip->nx[i] = nx * unit;
+		strip->ny[i] = ny * unit;
+		strip->nz[i] = nz * unit;
+	}
+}
+
+#endif
