@@ -22,7 +22,8 @@ for study; do
 	octree-prefixes) models=(-r 512 --models "${scans}pinetree") ;;
 	octree-splats) models=(--models "${scans}teapot") ;;
 	octree-alias) models=(--out docs/studies) ;;
-	octree-offsets | octree-levels) models=(--out docs/studies --models "${scans}dragon") ;; # the first one
+	octree-offsets) models=(--out docs/studies --models gavel) ;;
+	octree-levels) models=(--out docs/studies --models "${scans}dragon") ;; # the first one
 	esac
 	"$program" "$study" --keep "$work" "${models[@]}" "${plot[@]}" >"$work/table"
 	[ ${#plot[@]} -eq 0 ] || mv "$work/$study.svg" docs/studies/

@@ -1,4 +1,4 @@
-/* Figures 8 to 12 of [B]: offsets, textures finer than pixels, and points beside splats by levels. */
+/* Figures 8 to 10 and 12 of [B]: offsets, textures finer than pixels, and points beside splats by levels. */
 #include <string.h>
 #include "figures.h"
 #include "models/studies/tables/octree.h"

@@ -49,7 +49,8 @@ int octree_model(struct psr_model **out, struct study *study, const struct octre
 /* octree_scan.c: builds an octree of points that a scanner would find on a mesh. */
 int octree_scanned(struct octree **tree, struct study *study, const struct study_model *of, int levels);
 
-/* Makes the octree of a mesh, or of a scan of it, and the model of it. The caller owns *tree, which is NULL or whole, and *out. */
+/* Makes the octree of a mesh, or of a scan of it, and the model of it. The caller owns *tree, which is NULL or whole, and
+ * *out. */
 int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,
                   int levels);
 
