@@ -7,7 +7,7 @@
 #define POINTS_FULL (POINTS_BATCH - DPOINT_GROUP) /* a batch of more is drawn: the next group may be a whole one */
 #define POINTS_ROUNDING 0.0625f /* pixels: of bounds */
 
-enum points_side { POINTS_FRONT = 1, POINTS_BACK = 2 };
+enum points_side { POINTS_FRONT = 1, POINTS_BACK = 2, POINTS_FRONT_OF_FEW = 4 };
 
 /* Lines of sight in a point's frame. That through pixel (x + dx, y + dy) at depth z + s is at
  *   from + scale (dx right + dy down) + s (sight + [perspective] (dx right + dy down)). */
@@ -154,8 +154,8 @@ static inline int32_t points_pixel(float x, int32_t low, int32_t high)
 	return psr_floor_int((x < most ? x : most) - 0.5f) + 1;
 }
 
-/* Returns how many points may be in the tile. */
-static inline uint32_t sort_points(struct points_batch *b, const struct warp_target *t)
+/* Returns how many points may be in the tile. few: fronts of points with at most as many pixels are told apart. */
+static inline uint32_t sort_points(struct points_batch *b, const struct warp_target *t, int32_t few)
 {
 	const uint32_t n = points_lanes(b->p.n);
 	const int32_t left = t->x0, right = t->x1, top = t->y0, bottom = t->y1;
@@ -170,9 +170,11 @@ static inline uint32_t sort_points(struct points_batch *b, const struct warp_tar
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t is_inside = (i < b->p.n) & (b->x0[i] < b->x1[i]) & (b->y0[i] < b->y1[i]);
 		const uint32_t has_back = (uint32_t)!b->is_mixed[i] & (b->away[1][i] <= 0);
+		const int32_t n_pixels = (b->x1[i] - b->x0[i]) * (b->y1[i] - b->y0[i]);
+		const uint32_t front = !has_back & (n_pixels <= few) ? POINTS_FRONT_OF_FEW : POINTS_FRONT;
 
 		n_inside += is_inside;
-		b->sides[i] = (0u - is_inside) & ((b->away[0][i] <= 0 ? POINTS_FRONT : 0) | (has_back ? POINTS_BACK : 0));
+		b->sides[i] = (0u - is_inside) & ((b->away[0][i] <= 0 ? front : 0) | (has_back ? POINTS_BACK : 0));
 	}
 	return n_inside;
 }

@@ -78,17 +78,23 @@ static inline void widen_strips(float *restrict least, float *restrict most, uin
 	}
 }
 
-/* Returns 0 where the bounds are all that is known, or not worth more. */
+/* Whether spans may be worth their cost. */
+static inline int has_spans(const struct points_batch *b, uint32_t i)
+{
+	return points_strips(b->y1[i] - b->y0[i]) * points_strips(b->x1[i] - b->x0[i]) >= SPANS_LEAST;
+}
+
+/* Returns 0 where the bounds are all that is known. */
 static inline int find_spans(struct points_spans *spans, const struct points_batch *b, uint32_t i,
                              const struct warp_target *t)
 {
 	static const uint8_t edge[12][2] = { { 0, 1 }, { 2, 3 }, { 4, 5 }, { 6, 7 }, { 0, 2 }, { 1, 3 },
 		                                 { 4, 6 }, { 5, 7 }, { 0, 4 }, { 1, 5 }, { 2, 6 }, { 3, 7 } };
 	const int32_t x0 = b->x0[i], x1 = b->x1[i];
-	const uint32_t n_strips = points_strips(b->y1[i] - b->y0[i]), n = points_lanes(n_strips);
+	const uint32_t n = points_lanes(points_strips(b->y1[i] - b->y0[i]));
 	float x[8], y[8], least[SPANS_ROOM], most[SPANS_ROOM];
 
-	if (n_strips * points_strips(x1 - x0) < SPANS_LEAST || !place_corners(x, y, b, i, t))
+	if (!place_corners(x, y, b, i, t))
 		return 0;
 	for (uint32_t s = 0; s < n; s++) {
 		least[s] = (float)x1;
