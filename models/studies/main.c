@@ -59,17 +59,18 @@
 
 /* Of [B], table 1: a processor of 1.5 GHz, 512x512 pixels. */
 #define NOTE_OCTREE \
-	"codes ... col.: bits a point, codes in core and then all packed; fps: frames a second of points, then of blocks;\n" \
-	"time: of points over that of blocks; wrong: holes and leaks, of a million pixels inside.\n\n" \
-	"[B]                M pts  codes  packed  offs.  norm.   fps\n" \
-	"St. Matthew 9       0.40   2.70    1.70   1.60   9.80  19.2\n" \
-	"St. Matthew 10      1.60   2.70    1.30   1.50   8.60   6.2\n" \
-	"Max Planck 9        0.70   2.80    1.40   1.50   5.10  16.3\n" \
-	"Max Planck 10       2.60   2.70    1.00   1.40   3.30   5.1\n" \
-	"Max Planck 11      10.50   2.70    0.90   1.30   1.90   1.4\n" \
-	"Terrain 10          4.10   2.60    1.30   1.30   7.10   2.5\n" \
-	"David 10            4.40   2.60    1.30   1.50   7.40   3.0\n" \
-	"Tree 10             5.70   3.60    2.90   1.50   5.40   1.7"
+	"codes ... col.: bits a point, codes in core and then all packed; in core an offset has 8, a normal 16, a colour 24.\n" \
+	"fps: frames a second of points, splats and blocks; Mpt/s: points of the whole tree times fps. wrong: holes and\n" \
+	"leaks, of a million pixels inside, of points and splats.\n\n" \
+	"[B]                M pts  codes  packed  offs.  norm.   fps  splats\n" \
+	"St. Matthew 9       0.40   2.70    1.70   1.60   9.80  19.2     4.1\n" \
+	"St. Matthew 10      1.60   2.70    1.30   1.50   8.60   6.2     1.3\n" \
+	"Max Planck 9        0.70   2.80    1.40   1.50   5.10  16.3     5.2\n" \
+	"Max Planck 10       2.60   2.70    1.00   1.40   3.30   5.1     1.6\n" \
+	"Max Planck 11      10.50   2.70    0.90   1.30   1.90   1.4     0.5\n" \
+	"Terrain 10          4.10   2.60    1.30   1.30   7.10   2.5     0.7\n" \
+	"David 10            4.40   2.60    1.30   1.50   7.40   3.0     1.2\n" \
+	"Tree 10             5.70   3.60    2.90   1.50   5.40   1.7     1.0"
 
 static const struct study_kind tables[] = {
 	{ "tolerance", "figure 5.5", "tolerance angle, equilateral lattice", table_tolerance, FIVE, NULL,
@@ -119,6 +120,12 @@ static const struct study_kind figures[] = {
 	{ .name = "interfaces", "figure 9.3", "interfaces between levels of the depth buffer", figure_interfaces },
 	{ .name = "thin", "figure 9.4", "thin structures", figure_thin },
 	{ .name = "stills", "section 9.1.1", "stills: resolution of the model, and passes", figure_stills },
+	{ .name = "octree-offsets", .figure = "[B] figures 8, 9", .what = "octrees without and with offsets",
+	  .run = figure_octree_offsets, .models = "dragon" },
+	{ .name = "octree-alias", .figure = "[B] figure 10", .what = "octrees of textures finer than pixels",
+	  .run = figure_octree_alias, .models = "terrain" },
+	{ .name = "octree-levels", .figure = "[B] figure 12", .what = "octrees as points and as splats, by levels",
+	  .run = figure_octree_levels, .models = "dragon" },
 	{ .name = "zoom", "section 9.1", "a zoom: error and popping, frame by frame", figure_zoom, .plot = figure_zoom_plot },
 };
 #define N_TABLES (sizeof tables / sizeof *tables)
@@ -147,14 +154,19 @@ static const char *paper(const struct study_kind *kind)
 	return kind->figure[0] == '[' ? "" : "[G] ";
 }
 
+static void print_kind(const struct study_kind *kind)
+{
+	printf("%-15s  %s%-17s  %s\n", kind->name, paper(kind), kind->figure, kind->what);
+}
+
 static void print_list(void)
 {
 	puts("tables:");
 	for (size_t i = 0; i < N_TABLES; i++)
-		printf("%-14s  %s%-17s  %s\n", tables[i].name, paper(&tables[i]), tables[i].figure, tables[i].what);
+		print_kind(&tables[i]);
 	puts("\nfigures:");
 	for (size_t i = 0; i < N_FIGURES; i++)
-		printf("%-14s  [G] %-17s  %s\n", figures[i].name, figures[i].figure, figures[i].what);
+		print_kind(&figures[i]);
 }
 
 /* ---- tables ---- */
@@ -233,9 +245,9 @@ static void print_text(const struct study *study)
 		printf("\n%s\n", study->kind->note);
 }
 
-static int run_table(struct study *study, const char *models, const char *plot, int json)
+static int run_table(struct study *study, const char *plot, int json)
 {
-	int rc = load_models(study, models != NULL ? models : study->kind->models);
+	int rc = load_models(study, study->names);
 
 	if (rc == PSR_OK)
 		rc = study->kind->run(study);
@@ -262,7 +274,7 @@ static int run_figure(struct study *study)
 
 	if (rc != PSR_OK)
 		return rc;
-	printf("%s ([G] %s)\n\n", study->kind->what, study->kind->figure);
+	printf("%s (%s%s)\n\n", study->kind->what, paper(study->kind), study->kind->figure);
 	rc = study->kind->run(study);
 	psr_renderer_destroy(study->renderer);
 	return rc;
@@ -287,8 +299,9 @@ int main(int argc, char **argv)
 		{ .name = "version", .type = PSR_OPT_FLAG, .value = &version, .help = "Prints the version." },
 		{ .name = "Tables", .type = PSR_OPT_HEADING },
 		{ .name = "models", .type = PSR_OPT_STRING, .value = &models, .arg = "LIST",
-		  .help = "The models to study: names of generators (psr-model make --list) and files, with commas between them."
-		          " A name with a dot or a slash is a file. Each table has models of its own if none are given." },
+		  .help = "The models to study: names of generators (psr-model make --list), terrain, and files, with commas"
+		          " between them. A name with a dot or a slash is a file; octrees of scan:NAME are of points that a"
+		          " scanner finds on it. Each study has models of its own if none are given." },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "RES",
 		  .help = "The resolution of the models, as for psr-model build; times grow with its square.", .min = 16,
 		  .max = 2048, .seen = &has_resolution },
@@ -335,18 +348,21 @@ int main(int argc, char **argv)
 		code = psr_fail(&err, PSR_ERR_ARG, "expected one NAME, got %d; psr-study --list prints the names", n_operands);
 	if (code == PSR_OK && (study.kind = find_kind(argv[1], &is_figure, &err)) == NULL)
 		code = err.code;
-	if (code == PSR_OK && is_figure && (models != NULL || has_resolution || plot != NULL || json))
-		code = psr_fail(&err, PSR_ERR_ARG, "%s is a figure; --models, --resolution, --plot and --json are for tables",
-		                argv[1]);
+	if (code == PSR_OK && is_figure && (has_resolution || plot != NULL || json))
+		code = psr_fail(&err, PSR_ERR_ARG, "%s is a figure; --resolution, --plot and --json are for tables", argv[1]);
+	if (code == PSR_OK && is_figure && models != NULL && study.kind->models == NULL)
+		code = psr_fail(&err, PSR_ERR_ARG, "%s has models of its own; --models is for tables and figures of octrees", argv[1]);
 	if (code == PSR_OK && !is_figure && has_out)
 		code = psr_fail(&err, PSR_ERR_ARG, "%s is a table; --out is for figures, --plot FILE draws a table", argv[1]);
+	if (code == PSR_OK)
+		study.names = models != NULL ? models : study.kind->models;
 	study.resolution = (uint32_t)resolution;
 	study.n_threads = (int)n_threads;
 	study.has_bar = isatty(STDERR_FILENO);
 	if (code == PSR_OK && (code = psr_pool_create(&study.pool, study.n_threads, NULL)) != PSR_OK)
 		psr_fail(&err, code, "%d threads cannot be started", study.n_threads);
 	if (code == PSR_OK)
-		code = is_figure ? run_figure(&study) : run_table(&study, models, plot, json);
+		code = is_figure ? run_figure(&study) : run_table(&study, plot, json);
 	psr_pool_destroy(study.pool);
 	if (code == PSR_OK && fflush(stdout) != 0)
 		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");

@@ -167,5 +167,9 @@ int figure_thin(struct study *study);
 int figure_stills(struct study *study);
 int figure_zoom(struct study *study);
 extern const char figure_zoom_plot[];
+/* Of the first model of study->names. */
+int figure_octree_offsets(struct study *study);
+int figure_octree_alias(struct study *study);
+int figure_octree_levels(struct study *study);
 
 #endif

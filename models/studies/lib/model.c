@@ -7,6 +7,7 @@
 #include "psr/build.h"
 #include "surface/validate.h"
 #include "study.h"
+#include "terrain.h"
 
 #define N_TRIAL_VIEWS 200
 #define N_TRIALS_A_VIEW 500
@@ -65,11 +66,13 @@ int study_model_make(struct study_model *model, const char *name, void (*make)(s
 	return prepare(model, code, err);
 }
 
-int study_model_load(struct study_model *model, const char *name, struct psr_error *err)
+static int load(struct study_model *model, const char *name, struct psr_error *err)
 {
 	const char *slash = strrchr(name, '/');
 	const struct generator *generator;
 
+	if (strcmp(name, "terrain") == 0)
+		return study_model_make(model, name, make_terrain, err);
 	if (strpbrk(name, "./") == NULL) {
 		generator = generator_find(name, err);
 		return generator != NULL ? study_model_make(model, generator->name, generator->make, err) : err->code;
@@ -77,6 +80,20 @@ int study_model_load(struct study_model *model, const char *name, struct psr_err
 	*model = (struct study_model){ .mesh = NULL };
 	snprintf(model->name, sizeof model->name, "%s", slash != NULL ? slash + 1 : name);
 	return prepare(model, psr_mesh_import(&model->mesh, name, NULL, err), err);
+}
+
+int study_model_load(struct study_model *model, const char *name, struct psr_error *err)
+{
+	const int is_scanned = strncmp(name, "scan:", 5) == 0;
+	const int code = load(model, is_scanned ? name + 5 : name, err);
+
+	if (code == PSR_OK && is_scanned) {
+		memmove(model->name + 5, model->name, sizeof model->name - 5);
+		memcpy(model->name, "scan:", 5);
+		model->name[sizeof model->name - 1] = '\0';
+		model->is_scanned = 1;
+	}
+	return code;
 }
 
 void study_model_fini(struct study_model *model)
@@ -90,7 +107,7 @@ void study_model_fini(struct study_model *model)
 /* Only a generator's name tells what the model shows. */
 static int kept_path(char path[1024], const struct study *study, const struct study_model *model)
 {
-	return study->keep != NULL && strchr(model->name, '.') == NULL
+	return study->keep != NULL && strpbrk(model->name, ".:") == NULL
 	       && snprintf(path, 1024, "%s/%s-%u.psr", study->keep, model->name, study->resolution) < 1024;
 }
 

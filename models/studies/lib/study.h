@@ -64,9 +64,11 @@ struct study_model {
 	double origin[3], scale;
 	struct ray_scene *scene;
 	struct trials *trials;
+	int is_scanned; /* octrees are made from points that a scanner would find, and not from the mesh */
 };
 
-/* A generator's name (psr-model make), or a file, which has a dot or a slash in its name. */
+/* A generator's name (psr-model make), "terrain", or a file, which has a dot or a slash in its name; scan:NAME is a
+ * scan of one of these. */
 int study_model_load(struct study_model *model, const char *name, struct psr_error *err);
 /* The shape that `make` makes. */
 int study_model_make(struct study_model *model, const char *name, void (*make)(struct shape *), struct psr_error *err);
@@ -79,6 +81,7 @@ struct study {
 	uint32_t resolution;
 	const char *keep; /* folder of built models, for other studies to read; NULL: none */
 	const char *out;  /* folder of a figure's pictures */
+	const char *names; /* of the models, with commas between them; NULL: the standard set */
 	struct psr_pool *pool;
 	struct psr_renderer *renderer; /* figures only */
 	int n_threads, n_models;
@@ -91,8 +94,8 @@ struct study {
 struct study_kind {
 	const char *name, *figure, *what; /* "figure 5.5"; of other papers "[B] table 1" */
 	int (*run)(struct study *study);  /* fills the table; a figure prints its own, and writes pictures */
+	const char *models; /* default of --models: a list with commas; NULL: the standard set, and a figure takes none */
 	/* A table's: */
-	const char *models; /* default of --models: a list with commas; NULL: the standard set */
 	const char *note;   /* printed below the table; may be NULL */
 	/* A gnuplot program after `set terminal` and `set output`; NULL: nothing to plot. Reads $table: number of the row,
 	 * label, and the means of the table's columns. */

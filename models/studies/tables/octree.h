@@ -24,9 +24,17 @@ struct octree_drawn {
 	double inside_db;      /* of octree_score() */
 };
 
-/* Draws all views of two models in turn. Needs study->renderer. */
-int octree_compare(struct octree_drawn drawn[2], struct study *study, const struct study_model *of,
-                   const struct psr_model *const model[2], const struct octree_truth *truth);
+#define OCTREE_MOST_WAYS 3
+
+/* A way to show a model. */
+struct octree_way {
+	const struct psr_model *model;
+	int with_splats;
+};
+
+/* Draws all views in each of n ways, in turn. Needs study->renderer. */
+int octree_compare(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
+                   const struct octree_way *way, int n, const struct octree_truth *truth);
 
 /* Draws all views of a model with these settings, of OCTREE_SIDE pixels. Needs study->renderer. */
 int octree_score(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
@@ -35,7 +43,14 @@ int octree_score(struct octree_drawn *drawn, struct study *study, const struct s
 /* How many pixels of a view are a unit of the mesh, in the middle of the model. */
 double octree_pixels(const struct study_model *of);
 
-/* Makes the octree of a mesh, and the model of it. The caller owns *tree, which is NULL or whole, and *out. */
+/* Makes the model of a tree in units of its source. */
+int octree_model(struct psr_model **out, struct study *study, const struct octree *tree);
+
+/* octree_scan.c: builds an octree of points that a scanner would find on a mesh. */
+int octree_scanned(struct octree **tree, struct study *study, const struct study_model *of, int levels);
+
+/* Makes the octree of a mesh, or of a scan of it, and the model of it. The caller owns *tree, which is NULL or whole, and
+ * *out. */
 int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,
                   int levels);
 

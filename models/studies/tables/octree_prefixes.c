@@ -45,17 +45,18 @@ static int put_part(struct study *study, int row, const struct study_model *of, 
                     const struct octree_truth *truth)
 {
 	const size_t n = packed->n / 100 * parts[row % N_PARTS] + packed->n % 100 * parts[row % N_PARTS] / 100;
-	struct psr_model *model[2] = { NULL, packed->whole };
+	struct psr_model *part = NULL;
 	struct octree_drawn drawn[2];
 	int rc;
 
 	*study_at(&study->table, row, 0, CAME) = (double)n * 1e-6;
-	if (psr_model_parse(&model[0], packed->bytes, n, NULL) != PSR_OK)
+	if (psr_model_parse(&part, packed->bytes, n, NULL) != PSR_OK)
 		return PSR_OK;
-	rc = octree_compare(drawn, study, of, (const struct psr_model *const *)model, truth);
-	*study_at(&study->table, row, 0, DEPTH) = psr_model_octree(model[0])->levels;
-	*study_at(&study->table, row, 0, POINTS) = (double)psr_model_octree(model[0])->n_leaves * 1e-6;
-	psr_model_unref(model[0]);
+	const struct octree_way way[] = { { .model = part }, { .model = packed->whole } };
+	rc = octree_compare(drawn, study, of, way, 2, truth);
+	*study_at(&study->table, row, 0, DEPTH) = psr_model_octree(part)->levels;
+	*study_at(&study->table, row, 0, POINTS) = (double)psr_model_octree(part)->n_leaves * 1e-6;
+	psr_model_unref(part);
 	if (rc != PSR_OK)
 		return rc;
 	*study_at(&study->table, row, 0, FPS) = drawn[0].fps;

@@ -57,38 +57,49 @@ static int compare_doubles(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Draws the view of each model in turn, and adds the median seconds of each. */
-static int time_view(double seconds[2], struct study *study, const struct psr_model *const model[2], struct stage *stage,
-                     struct psr_frame *frame)
+/* What is compared, and what comes of it. */
+struct comparison {
+	struct study *study;
+	const struct octree_way *way;
+	int n;
+	double seconds[OCTREE_MOST_WAYS];
+	struct sums {                     /* of the views of a model */
+		double square, square_inside; /* over pixels that are covered; inside: for decibels */
+		double n, n_inside, n_wrong;  /* of these; wrong: holes and leaks */
+	} sums[OCTREE_MOST_WAYS];
+};
+
+static int draw_way(const struct comparison *c, int i, struct stage *stage, struct psr_frame *frame)
 {
 	struct render_settings settings;
-	double time[2][TRIALS];
 
 	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
-	for (int trial = 0; trial <= TRIALS; trial++)
-		for (int m = 0; m < 2; m++) {
-			const uint64_t start = clock_ns();
-			int rc;
+	settings.with_ewa = c->way[i].with_splats;
+	stage->instance.model = c->way[i].model;
+	return renderer_draw(c->study->renderer, &stage->scene, &settings, c->study->pool, frame, c->study->err);
+}
 
-			stage->instance.model = model[m];
-			rc = renderer_draw(study->renderer, &stage->scene, &settings, study->pool, frame, study->err);
+/* Draws the view in each way in turn, and adds the median seconds of each. */
+static int time_view(struct comparison *c, struct stage *stage, struct psr_frame *frame)
+{
+	double time[OCTREE_MOST_WAYS][TRIALS];
+
+	for (int trial = 0; trial <= TRIALS; trial++)
+		for (int i = 0; i < c->n; i++) {
+			const uint64_t start = clock_ns();
+			const int rc = draw_way(c, i, stage, frame);
+
 			if (rc != PSR_OK)
 				return rc;
 			if (trial > 0) /* the first one warms */
-				time[m][trial - 1] = (double)(clock_ns() - start) * 1e-9;
+				time[i][trial - 1] = (double)(clock_ns() - start) * 1e-9;
 		}
-	for (int m = 0; m < 2; m++) {
-		qsort(time[m], TRIALS, sizeof time[0][0], compare_doubles);
-		seconds[m] += time[m][TRIALS / 2];
+	for (int i = 0; i < c->n; i++) {
+		qsort(time[i], TRIALS, sizeof time[0][0], compare_doubles);
+		c->seconds[i] += time[i][TRIALS / 2];
 	}
 	return PSR_OK;
 }
-
-/* Of the views of a model. */
-struct sums {
-	double square, square_inside; /* over pixels that are covered; inside: for decibels */
-	double n, n_inside, n_wrong;  /* of these; wrong: holes and leaks */
-};
 
 static int add_errors(struct sums *sums, struct study *study, const struct psr_model *model,
                       const struct psr_frame *drawn, const struct psr_source_planes *truth)
@@ -113,45 +124,40 @@ static struct octree_drawn drawn_of(const struct sums *sums, double seconds)
 		                          .inside_db = -10 * log10(sums->square_inside / sums->n_inside) };
 }
 
-static int judge_view(struct sums sums[2], struct study *study, const struct psr_model *const model[2],
-                      struct stage *stage, const struct psr_frame *frame, const struct psr_source_planes *truth)
+static int judge_view(struct comparison *c, struct stage *stage, const struct psr_frame *frame,
+                      const struct psr_source_planes *truth)
 {
-	struct render_settings settings;
+	int rc = PSR_OK;
 
-	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
-	for (int m = 0; m < 2; m++) {
+	for (int i = 0; rc == PSR_OK && i < c->n; i++) {
 		struct psr_frame drawn = *frame;
 
-		stage->instance.model = model[m];
-		int rc = renderer_draw(study->renderer, &stage->scene, &settings, study->pool, &drawn, study->err);
+		rc = draw_way(c, i, stage, &drawn);
 		if (rc == PSR_OK)
-			rc = add_errors(&sums[m], study, model[m], &drawn, truth);
-		if (rc != PSR_OK)
-			return rc;
+			rc = add_errors(&c->sums[i], c->study, c->way[i].model, &drawn, truth);
 	}
-	return PSR_OK;
+	return rc;
 }
 
-int octree_compare(struct octree_drawn drawn[2], struct study *study, const struct study_model *of,
-                   const struct psr_model *const model[2], const struct octree_truth *truth)
+int octree_compare(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
+                   const struct octree_way *way, int n, const struct octree_truth *truth)
 {
 	struct psr_frame quiet = { .width = OCTREE_SIDE, .height = OCTREE_SIDE, .rgb = truth->frame.rgb };
-	struct sums sums[2] = { { .n = 0 } };
-	double seconds[2] = { 0, 0 };
+	struct comparison c = { .study = study, .way = way, .n = n };
 
 	for (int v = 0; v < OCTREE_VIEWS; v++) {
 		struct stage stage;
 		int rc;
 
 		set_stage(&stage, of, directions[v]);
-		rc = time_view(seconds, study, model, &stage, &quiet);
+		rc = time_view(&c, &stage, &quiet);
 		if (rc == PSR_OK)
-			rc = judge_view(sums, study, model, &stage, &truth->frame, &truth->view[v]);
+			rc = judge_view(&c, &stage, &truth->frame, &truth->view[v]);
 		if (rc != PSR_OK)
 			return rc;
 	}
-	for (int m = 0; m < 2; m++)
-		drawn[m] = drawn_of(&sums[m], seconds[m]);
+	for (int i = 0; i < n; i++)
+		drawn[i] = drawn_of(&c.sums[i], c.seconds[i]);
 	return PSR_OK;
 }
 
@@ -227,20 +233,25 @@ int octree_truth_init(struct octree_truth *truth, struct study *study, const str
 	return rc;
 }
 
+int octree_model(struct psr_model **out, struct study *study, const struct octree *tree)
+{
+	struct psr_model_info info;
+	struct octree inner;
+
+	psr_octree_info(&info, tree);
+	psr_octree_to_inner(&inner, tree, &info);
+	return psr_model_create_octree(out, &info, &inner, NULL, study->err);
+}
+
 int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,
                   int levels)
 {
 	struct octree_build_options options;
-	struct psr_model_info info;
-	struct octree inner;
 	int rc;
 
 	octree_build_options_default(&options);
 	options.levels = levels;
-	rc = octree_of_mesh(tree, NULL, of->mesh, &options, study->err);
-	if (rc != PSR_OK)
-		return rc;
-	psr_octree_info(&info, *tree);
-	psr_octree_to_inner(&inner, *tree, &info);
-	return psr_model_create_octree(out, &info, &inner, NULL, study->err);
+	rc = of->is_scanned ? octree_scanned(tree, study, of, levels)
+	                    : octree_of_mesh(tree, NULL, of->mesh, &options, study->err);
+	return rc == PSR_OK ? octree_model(out, study, *tree) : rc;
 }

@@ -30,6 +30,22 @@ static void a_mean_leaves_out_what_is_not_known(void **state)
 	study_table_fini(&table);
 }
 
+static void scans_are_asked_for_by_name(void **state)
+{
+	struct psr_error err;
+	struct study_model model;
+
+	(void)state;
+	assert_int_equal(study_model_load(&model, "gavel", &err), PSR_OK);
+	assert_false(model.is_scanned);
+	study_model_fini(&model);
+	assert_int_equal(study_model_load(&model, "scan:gavel", &err), PSR_OK);
+	assert_true(model.is_scanned);
+	assert_string_equal(model.name, "scan:gavel");
+	study_model_fini(&model);
+	assert_int_not_equal(study_model_load(&model, "scan:gravel", &err), PSR_OK);
+}
+
 /* A large model does not outweigh a small one: the mean of 2/1 and 10/20 is 1.25, the ratio of the sums 12/21. */
 static void ratios_are_made_model_by_model(void **state)
 {
@@ -233,6 +249,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_mean_leaves_out_what_is_not_known),
+		cmocka_unit_test(scans_are_asked_for_by_name),
 		cmocka_unit_test(ratios_are_made_model_by_model),
 		cmocka_unit_test(a_table_is_printed_in_columns),
 		cmocka_unit_test(trials_find_holes_and_only_holes),
