@@ -274,6 +274,7 @@ EFFECTS    := $(BUILD)/tests/bench/effects
 CANCEL     := $(BUILD)/tests/bench/cancel
 POOL_BENCH := $(BUILD)/tests/bench/pool
 OCTREE_BENCH := $(BUILD)/tests/bench/octree $(BUILD)/tests/bench/octree_draws
+OCTREE_RATES := $(BUILD)/tests/bench/octree_rates
 DPOINT_BENCH := $(BUILD)/tests/bench/dpoint_draws
 CODEC_BENCH := $(BUILD)/tests/bench/codec
 DAEMON_BENCH := $(BUILD)/tests/bench/daemon
@@ -285,8 +286,8 @@ TRUTH      := $(BUILD)/tests/bench/truth
 BUDGET     := $(BUILD)/tests/bench/budget
 LARGE      := $(BUILD)/tests/bench/large
 LARGE_OCTREE := $(BUILD)/tests/bench/large_octree
-# Benchmarks run by hand, but are built with the tests, so that they are there when somebody wants to know. FRAMES needs
-# packages that no test needs.
+# Benchmarks run by hand, but are built with the tests, so that they are there when somebody wants to know. FRAMES and
+# OCTREE_RATES need packages that no test needs.
 ifeq ($(config),release)
 TEST_BIN   += $(BENCH) $(EFFECTS) $(CANCEL) $(POOL_BENCH) $(OCTREE_BENCH) $(DPOINT_BENCH) $(CODEC_BENCH) $(DAEMON_BENCH) $(REPROJECT_BENCH) \
 	$(VIEW_BENCH) $(LATENCY) $(FIRST) $(TRUTH) $(BUDGET) $(LARGE) $(LARGE_OCTREE)
@@ -361,6 +362,10 @@ $(CODEC_BENCH): $(BUILD)/tests/bench/codec.c.o $(CODEC_O) $(LIB)/libpsrproto.a $
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
 	peer peer_order pictures plot report scene thesis warp))
 $(FRAMES): $(FRAMES_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) -lOSMesa $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+RATES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level llvmpipe octree_rates ours peer peer_merge peer_order \
+	report scene))
+$(OCTREE_RATES): $(RATES_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lOSMesa $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 EFFECTS_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child effects effects_prices effects_quality isolate level ours price report scene))
 $(EFFECTS): $(EFFECTS_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a

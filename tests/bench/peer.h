@@ -23,6 +23,9 @@ struct peer_mesh {
 };
 void peer_mesh_init(struct peer_mesh *out, const struct psr_mesh *mesh, const struct psr_model *model);
 void peer_mesh_order(struct peer_mesh *mesh); /* for caches; look by look, then by place; done by init */
+/* Makes a mesh whose vertices are the means of those in the same cell of a grid of so many, at most 1024, a side, and of
+ * whose triangles those are left that still have three. */
+void peer_mesh_merge(struct peer_mesh *out, const struct peer_mesh *of, uint32_t cells);
 void peer_mesh_fini(struct peer_mesh *mesh);
 
 struct peer_points {
