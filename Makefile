@@ -547,8 +547,8 @@ viewer-picture: deps ## viewer-picture: install what is missing, build, renew do
 	$(Q)BUILD=$(BUILD) docs/viewer.sh
 
 studies: deps ## studies: install what is missing, build, repeat the thesis's studies, renew docs/studies.md and its plots (minutes)
-	$(Q).ci/deps $(DEPS_STUDY)
-	$(Q)$(MAKE) --no-print-directory compile
+	$(Q).ci/deps $(DEPS_BENCH)
+	$(Q)$(MAKE) --no-print-directory compile $(OCTREE_RATES)
 	$(Q)BUILD=$(BUILD) docs/studies.sh
 
 # --- packages -------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 program=${BUILD:-build/release}/bin/psr-study
+rates=${BUILD:-build/release}/tests/bench/octree_rates
 page=docs/studies.md
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -11,7 +12,7 @@ fetched=${XDG_CACHE_HOME:-$HOME/.cache}/psr/models
 scans=$(ls "$fetched/dragon.ply" "$fetched/armadillo.off" "$fetched/bunny.obj" 2>/dev/null | tr '\n' ,)
 
 [ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-offsets \
-	octree-alias octree-levels octree-prefixes octree-splats
+	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats
 for study; do
 	echo "study $study" >&2
 	plot=()
@@ -19,11 +20,18 @@ for study; do
 	models=()
 	case $study in
 	octree) models=(-r 512 --models "${scans}pinetree,terrain,scan:terrain") ;;
-	octree-prefixes) models=(-r 512 --models "${scans}pinetree") ;;
+	octree-prefixes) models=(-r 512 --models "${scans}pinetree,scan:terrain") ;;
 	octree-splats) models=(--models "${scans}teapot") ;;
+	octree-rates) # beside another renderer
+		[ -f "$fetched/dragon.ply" ] || { echo "dragon.ply is not here: make models fetches it" >&2; continue; }
+		"$rates" -o docs/studies/octree-rates.png "$fetched/dragon.ply" >"$work/table"
+		docs/put-table.sh $page "study $study" "$work/table"
+		continue
+		;;
 	octree-alias) models=(--out docs/studies) ;;
 	octree-offsets) models=(--out docs/studies --models gavel) ;;
 	octree-levels) models=(--out docs/studies --models "${scans}dragon") ;; # the first one
+	octree-parts) models=(--out docs/studies --models "scan:${scans}dragon") ;;
 	esac
 	"$program" "$study" --keep "$work" "${models[@]}" "${plot[@]}" >"$work/table"
 	[ ${#plot[@]} -eq 0 ] || mv "$work/$study.svg" docs/studies/

@@ -126,6 +126,8 @@ static const struct study_kind figures[] = {
 	  .run = figure_octree_alias, .models = "terrain" },
 	{ .name = "octree-levels", .figure = "[B] figure 12", .what = "octrees as points and as splats, by levels",
 	  .run = figure_octree_levels, .models = "dragon" },
+	{ .name = "octree-parts", .figure = "[B] figure 13", .what = "parts of packed octrees, as pictures",
+	  .run = figure_octree_parts, .models = "dragon" },
 	{ .name = "zoom", "section 9.1", "a zoom: error and popping, frame by frame", figure_zoom, .plot = figure_zoom_plot },
 };
 #define N_TABLES (sizeof tables / sizeof *tables)

@@ -171,5 +171,6 @@ extern const char figure_zoom_plot[];
 int figure_octree_offsets(struct study *study);
 int figure_octree_alias(struct study *study);
 int figure_octree_levels(struct study *study);
+int figure_octree_parts(struct study *study);
 
 #endif

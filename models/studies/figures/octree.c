@@ -1,6 +1,8 @@
-/* Figures 8 to 10 and 12 of [B]: offsets, textures finer than pixels, and points beside splats by levels. */
+/* Figures 8 to 10, 12 and 13 of [B]: offsets, textures finer than pixels, points beside splats by levels, and parts of
+ * files. */
 #include <string.h>
 #include "figures.h"
+#include "model/tree.h"
 #include "models/studies/tables/octree.h"
 
 #define RESOLUTION 256 /* of the blocks whose samples magnifications count in */
@@ -140,6 +142,52 @@ int figure_octree_levels(struct study *study)
 		psr_model_unref(points.model);
 	}
 	rc = figure_sheet_finish(&sheet, study, "octree-levels", rc);
+	figure_model_fini(&model);
+	return rc;
+}
+
+/* ---- figure 13 ---- */
+
+#define PARTS_LEVELS 10
+
+int figure_octree_parts(struct study *study)
+{
+	static const struct figure_look first = { 1, 256, 4, figure_view, .n_views = 1 };
+	static const struct figure_look look = { 1, 256, 4, figure_view, .n_views = FIGURE_VIEWS };
+	static const struct figure_part part = { 0, 0, 256, 256, 1 }, close = { FIGURE_FIND, 0, 64, 64, 4 };
+	struct figure_model model, parts[OCTREE_PARTS];
+	struct figure_way way[OCTREE_PARTS + 1] = { { .label = NULL } };
+	struct octree_packed packed = { .bytes = NULL };
+	struct figure_sheet sheet;
+	char label[OCTREE_PARTS][64];
+	int n = 0, rc = load(&model, study);
+
+	if (rc == PSR_OK)
+		rc = octree_packed_make(&packed, study, &model.source, PARTS_LEVELS);
+	for (int i = 0; rc == PSR_OK && i < OCTREE_PARTS; i++) {
+		size_t n_bytes;
+
+		parts[n] = (struct figure_model){ .model = octree_packed_part(&n_bytes, &packed, octree_parts[i]) };
+		if (parts[n].model == NULL)
+			continue;
+		snprintf(label[n], sizeof label[n], "%u %%, %.2f MB, %d levels", octree_parts[i], (double)n_bytes * 1e-6,
+		         psr_model_octree(parts[n].model)->levels);
+		way[n] = (struct figure_way){ .label = label[n], .model = &parts[n] };
+		n++;
+	}
+	figure_sheet_init(&sheet, (uint32_t)n + 1, &part);
+	if (rc == PSR_OK) {
+		figure_score_print_head("the first view");
+		rc = figure_compare(study, &sheet, &model, &first, &part, way);
+	}
+	if (rc == PSR_OK) {
+		figure_score_print_head("all views");
+		rc = figure_compare(study, &sheet, &model, &look, &close, way);
+	}
+	rc = figure_sheet_finish(&sheet, study, "octree-parts", rc);
+	while (n > 0)
+		psr_model_unref(parts[--n].model);
+	octree_packed_fini(&packed);
 	figure_model_fini(&model);
 	return rc;
 }

@@ -54,4 +54,23 @@ int octree_scanned(struct octree **tree, struct study *study, const struct study
 int octree_points(struct psr_model **out, struct octree **tree, struct study *study, const struct study_model *of,
                   int levels);
 
+/* ---- octree_prefixes.c ---- */
+
+/* A packed file of a model, in memory. */
+struct octree_packed {
+	uint8_t *bytes;
+	size_t n, capacity;
+	struct psr_model *whole;
+};
+
+/* In any case for octree_packed_fini(). */
+int octree_packed_make(struct octree_packed *packed, struct study *study, const struct study_model *of, int levels);
+void octree_packed_fini(struct octree_packed *packed);
+
+/* Returns what the first bytes of the file are, and how many these are; NULL where they are no model. */
+struct psr_model *octree_packed_part(size_t *n, const struct octree_packed *packed, unsigned percent);
+
+#define OCTREE_PARTS 4
+extern const unsigned octree_parts[OCTREE_PARTS]; /* percent, as in [B] */
+
 #endif

@@ -6,9 +6,8 @@
 #include "octree.h"
 
 #define LEVELS 11
-#define N_PARTS 4
 
-static const unsigned parts[N_PARTS] = { 5, 15, 50, 100 }; /* percent, as in [B] */
+const unsigned octree_parts[OCTREE_PARTS] = { 5, 15, 50, 100 };
 
 enum { CAME, DEPTH, POINTS, FPS, DB, BELOW, WRONG, N_COLUMNS };
 
@@ -19,20 +18,15 @@ static const struct study_column columns[N_COLUMNS] = {
 	[WRONG] = { "wrong", "wrong_pixels_a_million", 0 },
 };
 
-/* A packed file of a model, in memory. */
-struct packed {
-	uint8_t *bytes;
-	size_t n, capacity;
-	struct psr_model *whole;
-};
-
-static int make_packed(struct packed *packed, struct study *study, const struct study_model *of)
+int octree_packed_make(struct octree_packed *packed, struct study *study, const struct study_model *of, int levels)
 {
 	struct octree *tree = NULL;
 	const uint8_t *image;
 	size_t n_image;
-	int rc = octree_points(&packed->whole, &tree, study, of, LEVELS);
+	int rc;
 
+	*packed = (struct octree_packed){ .bytes = NULL };
+	rc = octree_points(&packed->whole, &tree, study, of, levels);
 	octree_destroy(tree);
 	if (rc != PSR_OK)
 		return rc;
@@ -40,17 +34,31 @@ static int make_packed(struct packed *packed, struct study *study, const struct 
 	return pack_image(&packed->bytes, &packed->n, &packed->capacity, image, n_image, study->err);
 }
 
-/* Puts down what the first bytes of the file are; nothing where they are no model. */
-static int put_part(struct study *study, int row, const struct study_model *of, const struct packed *packed,
-                    const struct octree_truth *truth)
+void octree_packed_fini(struct octree_packed *packed)
 {
-	const size_t n = packed->n / 100 * parts[row % N_PARTS] + packed->n % 100 * parts[row % N_PARTS] / 100;
+	psr_free_huge(packed->bytes, packed->capacity);
+	psr_model_unref(packed->whole);
+}
+
+struct psr_model *octree_packed_part(size_t *n, const struct octree_packed *packed, unsigned percent)
+{
 	struct psr_model *part = NULL;
+
+	*n = packed->n / 100 * percent + packed->n % 100 * percent / 100;
+	return psr_model_parse(&part, packed->bytes, *n, NULL) == PSR_OK ? part : NULL;
+}
+
+/* Puts down what the first bytes of the file are; nothing where they are no model. */
+static int put_part(struct study *study, int row, const struct study_model *of,
+                    const struct octree_packed *packed, const struct octree_truth *truth)
+{
 	struct octree_drawn drawn[2];
+	size_t n;
+	struct psr_model *part = octree_packed_part(&n, packed, octree_parts[row % OCTREE_PARTS]);
 	int rc;
 
 	*study_at(&study->table, row, 0, CAME) = (double)n * 1e-6;
-	if (psr_model_parse(&part, packed->bytes, n, NULL) != PSR_OK)
+	if (part == NULL)
 		return PSR_OK;
 	const struct octree_way way[] = { { .model = part }, { .model = packed->whole } };
 	rc = octree_compare(drawn, study, of, way, 2, truth);
@@ -69,19 +77,18 @@ static int put_part(struct study *study, int row, const struct study_model *of, 
 static int run_model(struct study *study, int m)
 {
 	const struct study_model *of = &study->model[m];
-	struct packed packed = { .bytes = NULL };
+	struct octree_packed packed = { .bytes = NULL };
 	struct octree_truth truth;
 	int rc = octree_truth_init(&truth, study, of);
 
 	if (rc == PSR_OK)
-		rc = make_packed(&packed, study, of);
-	for (int p = 0; rc == PSR_OK && p < N_PARTS; p++) {
-		study_label(&study->table, m * N_PARTS + p, "%.20s %u %%", of->name, parts[p]);
-		rc = put_part(study, m * N_PARTS + p, of, &packed, &truth);
+		rc = octree_packed_make(&packed, study, of, LEVELS);
+	for (int p = 0; rc == PSR_OK && p < OCTREE_PARTS; p++) {
+		study_label(&study->table, m * OCTREE_PARTS + p, "%.20s %u %%", of->name, octree_parts[p]);
+		rc = put_part(study, m * OCTREE_PARTS + p, of, &packed, &truth);
 		study_step(study, of->name);
 	}
-	psr_free_huge(packed.bytes, packed.capacity);
-	psr_model_unref(packed.whole);
+	octree_packed_fini(&packed);
 	octree_truth_fini(&truth);
 	return rc;
 }
@@ -89,9 +96,9 @@ static int run_model(struct study *study, int m)
 int table_octree_prefixes(struct study *study)
 {
 	const struct study_form form = { "model, part", columns, N_COLUMNS };
-	int rc = study_table_init(&study->table, form, study->n_models * N_PARTS, 1, study->err);
+	int rc = study_table_init(&study->table, form, study->n_models * OCTREE_PARTS, 1, study->err);
 
-	study->total = study->n_models * N_PARTS;
+	study->total = study->n_models * OCTREE_PARTS;
 	if (rc == PSR_OK)
 		rc = psr_renderer_create(&study->renderer, study->err);
 	for (int m = 0; rc == PSR_OK && m < study->n_models; m++)
