@@ -171,7 +171,7 @@ static inline uint32_t sort_points(struct points_batch *b, const struct warp_tar
 		const uint32_t is_inside = (i < b->p.n) & (b->x0[i] < b->x1[i]) & (b->y0[i] < b->y1[i]);
 		const uint32_t has_back = (uint32_t)!b->is_mixed[i] & (b->away[1][i] <= 0);
 		const int32_t n_pixels = (b->x1[i] - b->x0[i]) * (b->y1[i] - b->y0[i]);
-		const uint32_t front = !has_back & (n_pixels <= few) ? POINTS_FRONT_OF_FEW : POINTS_FRONT;
+		const uint32_t front = !has_back && n_pixels <= few ? POINTS_FRONT_OF_FEW : POINTS_FRONT;
 
 		n_inside += is_inside;
 		b->sides[i] = (0u - is_inside) & ((b->away[0][i] <= 0 ? front : 0) | (has_back ? POINTS_BACK : 0));
