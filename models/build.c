@@ -36,7 +36,7 @@
 	"  PCD         clouds of the Point Cloud Library; text, binary and compressed\n" \
 	"  STEP, IGES  exact surfaces of CAD, with colours and assemblies\n" \
 	"  PTS, PTX, XYZ\n" \
-	"              clouds as text, for octrees alone\n" \
+	"              clouds as text\n" \
 	"  the others  OBJ, STL, OFF, 3DS, Collada and other formats that Assimp reads"
 
 /* IN's name with .psr for its suffix; the caller frees it. */
@@ -112,7 +112,7 @@ static void summarize(const char *out, const struct made *made)
 		fprintf(stderr, PROGRAM ": warning: %s: points without a finite place were left out: %" PRIu64 "\n",
 		        made->input.path, made->input.n_left_out);
 	if (psr_model_point_set(made->model) != NULL)
-		points_summarize(&made->points, out, file_bytes, mesh->n_triangles);
+		points_summarize(&made->points, out, file_bytes, mesh);
 	if (tree != NULL)
 		printf("%s: %" PRIu64 " leaves of %.3g in an octree of %d levels, %.1f MB, from %" PRIu64 " %s in %.1f s\n", out,
 		       tree->n_leaves, ldexp(made->tree->edge, -tree->levels), tree->levels, (double)file_bytes / 1e6,
@@ -311,7 +311,7 @@ int cmd_build(int argc, char **argv)
 		  .min = OCTREE_LEAST_MEMORY, .max = 0x1p50 },
 		{ .name = "scan", .type = PSR_OPT_FLAG, .value = &wish.octree.with_scan,
 		  .help = "Keeps what LAS tells of points besides: intensity, class, return, GPS time; up to 8 bytes more a leaf." },
-		{ .name = "Differential points, for smooth meshes", .type = PSR_OPT_HEADING },
+		{ .name = "Differential points, for smooth surfaces", .type = PSR_OPT_HEADING },
 		{ .name = "eps", .type = PSR_OPT_REAL, .value = &wish.points.eps, .arg = "E",
 		  .help = "A point reaches until its normal has turned by the angle whose cosine is 1 - E. 0: 0.01, which is 8"
 		          " degrees.", .min = 0, .max = 0.5 },

@@ -58,15 +58,21 @@ int points_check(const struct points_wish *wish, int is_points, struct psr_error
 }
 
 void points_summarize(const struct dpoint_build_report *report, const char *out, uint64_t file_bytes,
-                      uint32_t n_triangles)
+                      const struct psr_mesh *mesh)
 {
-	printf("%s: %" PRIu64 " differential points of %" PRIu64 ", %.2f MB, from %" PRIu32 " triangles in %.1f s; normals"
+	const uint32_t n = mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points;
+
+	printf("%s: %" PRIu64 " differential points of %" PRIu64 ", %.2f MB, from %" PRIu32 " %s in %.1f s; normals"
 	       " within %.1f degrees, all within %.3g pixels of the surface\n", out, report->n_kept, report->n_candidates,
-	       (double)file_bytes / 1e6, n_triangles, report->seconds, report->normal_worst / PSR_DEGREE, report->off_worst);
+	       (double)file_bytes / 1e6, n, mesh->n_triangles > 0 ? "triangles" : "points of a cloud", report->seconds,
+	       report->normal_worst / PSR_DEGREE, report->off_worst);
 }
 
 void points_warn(const struct dpoint_build_report *report, double error)
 {
+	if (report->n_flat > 0)
+		fprintf(stderr, "psr-model build: warning: %" PRIu64 " points of the cloud have too few neighbours for a curvature, or"
+		        " neighbours along a line; they are flat\n", report->n_flat);
 	if (report->n_over > 0)
 		fprintf(stderr, "psr-model build: warning: %" PRIu64 " of %" PRIu64 " points are further from the surface than --error"
 		        " %g, up to %.3g pixels: the surface is finer there than the points' places; a greater error holds, and so may"

@@ -14,7 +14,7 @@ struct points_wish {
 	void *userdata;
 };
 
-/* Makes a model of a mesh's differential points. ARG, FORMAT, LIMIT, MEMORY. */
+/* Makes a model of a mesh's, or a cloud's, differential points. ARG, FORMAT, LIMIT, MEMORY. */
 int points_make(struct psr_model **out, struct dpoint_build_report *report, const struct psr_mesh *mesh,
                 const struct points_wish *wish, struct psr_error *err);
 
@@ -26,7 +26,7 @@ int points_check(const struct points_wish *wish, int is_points, struct psr_error
 
 /* Print what was built, and what is further off than `error`, which was asked for. */
 void points_summarize(const struct dpoint_build_report *report, const char *out, uint64_t file_bytes,
-                      uint32_t n_triangles);
+                      const struct psr_mesh *mesh);
 void points_warn(const struct dpoint_build_report *report, double error);
 
 #endif

@@ -74,11 +74,11 @@ struct mending {
 	struct dpoint_surface *surface;
 	const struct dpoint_cover_options *options;
 	const struct tally *tally;
-	uint32_t *own;           /* the candidate of each cell, or UINT32_MAX; NULL without a bound */
+	uint32_t *own;           /* the candidate of each cell, or UINT32_MAX; NULL: patches are flat */
 	struct bound_view view;
 };
 
-/* Kinds of patches over a cell; without a bound they are FLAT. */
+/* Kinds of patches over a cell. */
 enum kind { BENT, FLAT, OWN, N_KINDS };
 
 static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint32_t at, enum kind kind)
@@ -121,10 +121,10 @@ static int put_patch(struct mending *m, uint32_t at)
 	struct dpoint_candidate patch, *candidate;
 	int is_there, is_bad;
 
-	if (m->own != NULL) {
+	if (m->options->error > 0) {
 		is_there = bounded_patch(&patch, &is_bad, m, at);
 	} else {
-		is_there = patch_of(&patch, m, at, FLAT);
+		is_there = (m->own != NULL && patch_of(&patch, m, at, BENT)) || patch_of(&patch, m, at, FLAT);
 		is_bad = !is_there;
 	}
 	if (m->view.is_failed)
@@ -183,7 +183,7 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	rc = tally_init(&tally, cover);
 	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
 		tally_add(&tally, i, 1);
-	if (rc == PSR_OK && options->error > 0)
+	if (rc == PSR_OK && (options->error > 0 || surface->is_cloud))
 		rc = find_own(&m);
 	if (rc == PSR_OK)
 		rc = patch_below(&m, 0);

@@ -6,6 +6,8 @@
 #include "base/vec.h"
 
 #define MOST 6
+#define ROUNDING 1e-9
+#define OPEN 1e-4 /* of points that are nearly on one line, or two: their noise would be their curvature */
 #define TURNS 3 /* of a cloud's frame: each turn leaves the square of the slope before */
 
 /* Sums of squares of n unknowns: the upper half of the matrix, and the right side. */
@@ -23,8 +25,8 @@ static void add(struct sums *sums, const double row[MOST], double right, double 
 	}
 }
 
-/* By Cholesky's decomposition. A pivot that lost all but rounding to those before leaves its unknown open. */
-static int solve(double x[MOST], struct sums *sums)
+/* By Cholesky's decomposition. A pivot that lost all but this part to those before leaves its unknown open. */
+static int solve(double x[MOST], struct sums *sums, double least)
 {
 	const int n = sums->n;
 
@@ -33,7 +35,7 @@ static int solve(double x[MOST], struct sums *sums)
 
 		for (int k = 0; k < i; k++)
 			sums->m[i][i] -= sums->m[k][i] * sums->m[k][i];
-		if (!(sums->m[i][i] > 1e-9 * whole))
+		if (!(sums->m[i][i] > least * whole))
 			return 0;
 		sums->m[i][i] = sqrt(sums->m[i][i]);
 		for (int j = i + 1; j <= MOST; j++) {
@@ -100,14 +102,31 @@ int dpoint_shape_of_ring(struct dpoint_local *local, const struct dpoint_neighbo
 		add(&sums, (const double[MOST]){ p[0], p[1], 0 }, -normal[0] / normal[2], 1);
 		add(&sums, (const double[MOST]){ 0, p[0], p[1] }, -normal[1] / normal[2], 1);
 	}
-	if (!solve(x, &sums))
+	if (!solve(x, &sums, ROUNDING))
 		return 0;
 	for (int k = 0; k < 3; k++)
 		local->shape[k] = x[k] / size;
 	return 1;
 }
 
-int dpoint_shape_of_cloud(struct dpoint_local *local, const struct dpoint_neighbour *neighbour, uint32_t n)
+/* The root of the mean square of what neighbours are off the polynomial, less what six unknowns take of it. */
+static double residual(const struct dpoint_local *local, const struct dpoint_neighbour *neighbour, uint32_t n,
+                       const double x[MOST], double size)
+{
+	double sum = 0;
+
+	for (uint32_t i = 0; i < n; i++) {
+		double p[3], off;
+
+		seen(p, local, neighbour[i].at, size);
+		off = p[2] - (0.5 * x[0] * p[0] * p[0] + x[1] * p[0] * p[1] + 0.5 * x[2] * p[1] * p[1] + x[3] * p[0] +
+		              x[4] * p[1] + x[5]);
+		sum += off * off;
+	}
+	return sqrt(sum / (n > 5 ? n - 5 : 1)) * size;
+}
+
+int dpoint_shape_of_cloud(struct dpoint_local *local, double *off, const struct dpoint_neighbour *neighbour, uint32_t n)
 {
 	const double size = farthest(local, neighbour, n);
 
@@ -128,10 +147,11 @@ int dpoint_shape_of_cloud(struct dpoint_local *local, const struct dpoint_neighb
 			add(&sums, (const double[MOST]){ 0.5 * p[0] * p[0], p[0] * p[1], 0.5 * p[1] * p[1], p[0], p[1], 1 }, p[2],
 			    1 / (0.1 + r2));
 		}
-		if (!solve(x, &sums))
+		if (!solve(x, &sums, OPEN))
 			return 0;
 		slope2 = x[3] * x[3] + x[4] * x[4];
 		if (turn == TURNS || slope2 < 1e-16) {
+			*off = residual(local, neighbour, n, x, size);
 			/* What slope is left turns heights into curvatures by these. */
 			v3d_add_scaled(local->at, local->at, x[5] * size, local->axis[2]);
 			for (int k = 0; k < 3; k++)

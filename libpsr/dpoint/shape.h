@@ -16,7 +16,8 @@ int dpoint_shape_of_ring(struct dpoint_local *local, const struct dpoint_neighbo
 /* Computes place, axes and shape from places alone, for clouds: a polynomial of the second degree in a frame that turns
  * with it (a jet: Cazals and Pouget, "Estimating differential quantities using polynomial fitting of osculating jets",
  * 2005). local->at and a normal in local->axis[2] to begin with are given; neighbours' normals do not matter. The place
- * moves along the normal to the polynomial. Returns 0 as above: five neighbours at least. */
-int dpoint_shape_of_cloud(struct dpoint_local *local, const struct dpoint_neighbour *neighbour, uint32_t n);
+ * moves along the normal to the polynomial. *off: how far neighbours are off it, root mean square. Returns 0 as above:
+ * five neighbours at least. */
+int dpoint_shape_of_cloud(struct dpoint_local *local, double *off, const struct dpoint_neighbour *neighbour, uint32_t n);
 
 #endif

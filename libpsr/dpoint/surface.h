@@ -41,7 +41,8 @@ struct dpoint_surface {
 	struct dpoint_candidate *candidate;
 	size_t n_cells, n_candidates, cells_room, candidates_room;
 	uint64_t n_bad, n_clamped;  /* candidates that were left out; whose curvature was brought to the bound */
-	struct facets facets;       /* of a mesh; of other sources there are none */
+	struct facets facets;       /* of a mesh or a cloud; of other sources there are none */
+	int is_cloud;               /* cells are as far apart as samples are: what mends one keeps its curvatures */
 };
 
 void dpoint_surface_init(struct dpoint_surface *surface); /* empty */
@@ -98,10 +99,11 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
                       const struct psr_cancel *cancel);
 void dpoint_cover_fini(struct dpoint_cover *cover);
 
-/* Adds a flat candidate over each cell that none covers, and to the cover. It reaches over the cell's sides by a fifth
- * of its size, or to the sides of a rectangle around a triangle: so there is no hole where samples are too far apart for
- * the options, or where a crease is finer than a cell, and what is wrong there is as small as a cell. Left open are
- * cells without an area, and some that are as bent as their sides are long. */
+/* Adds a flat candidate over each cell that none covers, and to the cover: of a cloud, one as bent as its point if there
+ * is such a one. It reaches over the cell's sides by a fifth of its size, or to the sides of a rectangle around a
+ * triangle: so there is no hole where samples are too far apart for the options, or where a crease is finer than a cell,
+ * and what is wrong there is as small as a cell. Left open are cells without an area, and some that are as bent as their
+ * sides are long. */
 int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
                 const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel);
 

@@ -6,6 +6,7 @@
 #include "base/infile.h"
 #include "base/pool.h"
 #include "import.h"
+#include "points/points.h"
 
 #define SNIFF_BYTES 65536
 #define SURVEY_SIZES 10 /* sizes of the scene between its middle and the origin */
@@ -90,6 +91,7 @@ static void find_up(struct psr_mesh *mesh, const char *path, const uint8_t *byte
 {
 	static const char *const endings[] = { ".stl", ".amf", ".3mf" };
 	int has_z = is_las(path, bytes, n_bytes) || is_pcd(path, bytes, n_bytes) || import_cad_is(path, bytes, n_bytes) ||
+	             (!is_ply(path, bytes, n_bytes) && octree_source_suits(path)) ||
 	             (!is_gltf(path, bytes, n_bytes) && is_surveyed(mesh));
 
 	for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
@@ -130,6 +132,8 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 		rc = import_pcd(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK && import_cad_is(path, bytes, n_bytes))
 		rc = import_cad(&im, bytes, n_bytes, err);
+	else if (rc == PSR_OK && octree_source_suits(path))
+		rc = import_points(&im, err);
 	else if (rc == PSR_OK)
 		rc = import_assimp(&im, bytes, n_bytes, err);
 	if (rc == PSR_OK)

@@ -135,6 +135,10 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
  * MEMORY. */
 int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
 
+/* points/mesh_points.c: appends the points of im->path, a file that octree_source_suits(); colours if it has any. Errors
+ * as of octree_source_open(), and LIMIT, MEMORY. */
+int import_points(struct import_mesh *im, struct psr_error *err);
+
 /* path.c. The caller frees the strings. */
 /* Returns the folder of a file, resolved, without a slash at the end. */
 int import_path_folder(char **folder, const char *path, struct psr_error *err);

@@ -34,6 +34,43 @@ refuses "--error with --eps" 2 "leave out --error, or both of them" build_corner
 refuses "--error with --delta" 2 "leave out --error, or both of them" build_corner --delta 0.1 --error 1
 refuses "--error of blocks" 2 "add --representation dpoints" psr-model build "$work/corner.obj" --error 1 -o "$work/none.psr"
 
+# Clouds: a sphere as PLY, and as lines of numbers with some that are none.
+awk 'BEGIN { n = 20000; for (i = 0; i < n; i++) { z = 1 - (2 * i + 1) / n; r = sqrt(1 - z * z); a = 2.399963229728653 * i
+	printf "%.9g %.9g %.9g\n", r * cos(a), r * sin(a), z } }' >"$work/ball.txt"
+{
+	printf 'ply\nformat ascii 1.0\nelement vertex 20000\nproperty double x\nproperty double y\nproperty double z\nend_header\n'
+	cat "$work/ball.txt"
+} >"$work/ball.ply"
+{ cat "$work/ball.txt"; echo "nan 0 0"; } >"$work/ball.xyz"
+build_cloud() { psr-model build "$1" --representation dpoints -r 256 -o "${1%.*}.psr" "${@:2}"; }
+said() { "$@" 2>"$work/said"; }
+points() { psr-model info "$work/$1.psr" --json >"$work/$1.json" && number "$work/$1.json" points; }
+check "a cloud becomes differential points" build_cloud "$work/ball.ply"
+kept=$(points ball)
+check "few of them: $kept of 20000" [ "$kept" -gt 0 -a "$kept" -lt 1000 ]
+check "as text, too" said build_cloud "$work/ball.xyz"
+check "with a warning of what has no place" grep -q 'points without a finite place were left out: 1' "$work/said"
+is "and just as many" "$kept" "$(points ball)"
+psr shot "$work/ball.psr" --size 300x300 --no-smooth --codec lossless --ambient 1 -o "$work/ball.ppm" \
+	--depth "$work/ball.pfm" --report "$work/shot.json"
+{
+	echo OFF
+	echo "$((65 * 128)) $((64 * 128 * 2)) 0"
+	awk 'BEGIN { pi = atan2(0, -1); for (i = 0; i <= 64; i++) for (j = 0; j < 128; j++) { b = pi * i / 64; a = 2 * pi * j / 128
+		print sin(b) * cos(a), sin(b) * sin(a), cos(b) }
+		for (i = 0; i < 64; i++) for (j = 0; j < 128; j++) { k = i * 128 + j; l = i * 128 + (j + 1) % 128
+		print 3, k, k + 128, l + 128; print 3, k, l + 128, l } }'
+} >"$work/sphere.off"
+check "its picture is that of the sphere" psr-model accuracy "$work/sphere.off" --depth "$work/ball.pfm" --report "$work/shot.json"
+for bad in "1 2 3" "1 2 3\n1 2 3\n1 2 3" "$(seq -s '\n' -f '%g 0 0' 30)"; do
+	printf "$bad\n" >"$work/bad.xyz"
+	refuses "of what is no surface: $(printf "$bad" | head -n 1)..." 4 "has a surface around it, of seven points that are not on a line" \
+		build_cloud "$work/bad.xyz"
+done
+{ cat "$work/ball.txt"; seq -f '%g 3 0' 0 0.01 0.5; } >"$work/wire.xyz"
+check "a wire beside it is kept" said build_cloud "$work/wire.xyz"
+check "and counted" grep -q '51 points of the cloud have too few neighbours' "$work/said"
+
 # Sheer are surfaces of BLEND materials; the coverage of things narrower than a sample is none.
 psr-model make pencil -o "$work/pencil.glb" >/dev/null
 psr-model build "$work/pencil.glb" -r 64 -o "$work/pencil.psr" >/dev/null 2>"$work/said"

@@ -1,4 +1,4 @@
-#include "of_mesh.h"
+#include "building.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,14 +9,12 @@
 #include "dpoint/mesh.h"
 #include "model/blocks.h"
 #include "sample/octree/of_mesh.h"
-#include "surface/surface.h"
 #include "surface/texture.h"
 #include "surface/validate.h"
 
 #define OVERHANG 5e-4f
 #define SLACK 2e-5f       /* half a step of a place */
 #define SPARSE 4          /* of candidates that come in two turns */
-#define LOOKS 8           /* 255ths of a channel that a cell may differ from its point */
 
 void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)
 {
@@ -24,18 +22,7 @@ void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t
 		                                      .height = 1.0 / resolution, .piece = 0.01 };
 }
 
-struct building {
-	const struct psr_mesh *mesh;
-	const struct dpoint_build_options *options;
-	struct psr_error *err;
-	struct psr_model_info *info;
-	struct surface look;
-	uint8_t *two_sided; /* by material */
-	double *grain;      /* likewise */
-	struct dpoint_surface surface;
-};
-
-static void say(const struct building *b, const char *stage)
+void building_say(const struct building *b, const char *stage)
 {
 	if (b->options->on_progress != NULL)
 		b->options->on_progress(stage, 0, 1, b->options->userdata);
@@ -116,11 +103,11 @@ static float sine_of(const struct dpoint_build_options *o, double error)
 	return fminf(dpoint_sine(o->epsilon), (float)sqrt(error / (0.059 * 0.25)));
 }
 
-static struct dpoint_cover_options cover_options_of(const struct dpoint_build_options *o)
+struct dpoint_cover_options building_cover(const struct dpoint_build_options *o)
 {
 	struct dpoint_cover_options cover = {
 		.sine = dpoint_sine(o->epsilon), .slack = SLACK, .angle = (float)(o->degrees * PSR_DEGREE),
-		.height = (float)o->height, .overhang = OVERHANG, .looks = LOOKS,
+		.height = (float)o->height, .overhang = OVERHANG, .looks = BUILDING_LOOKS,
 	};
 
 	if (o->error > 0) {
@@ -133,38 +120,53 @@ static struct dpoint_cover_options cover_options_of(const struct dpoint_build_op
 }
 
 /* A normal is packed within 0.23 degrees, so a flat rectangle of 250 errors ends one error off. */
-static double delta_of(const struct dpoint_build_options *o)
+float building_delta(const struct dpoint_build_options *o)
 {
-	return o->error > 0 ? fmin(o->delta, 250 * o->error * pixel_of(o)) : o->delta;
+	const double most = o->error > 0 ? fmin(o->delta, 250 * o->error * pixel_of(o)) : o->delta;
+
+	return dpoint_delta_of_class(dpoint_delta_class((float)most));
+}
+
+static int put_mesh(struct building *b)
+{
+	const struct dpoint_build_options *o = b->options;
+	const struct dpoint_cover_options cover = building_cover(o);
+	const struct dpoint_mesh_options mesh = {
+		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
+		.cell = o->piece, .delta = building_delta(o), .grain_of = b->grain,
+		.cover = &cover,
+		.looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
+	};
+	int rc;
+
+	rc = find_sides(b);
+	if (rc != PSR_OK)
+		return psr_fail(b->err, rc, "no memory for the sides of %u triangles", b->mesh->n_triangles);
+	find_grains(b);
+	rc = dpoint_sample_mesh(&b->surface, b->mesh, &mesh, b->err);
+	if (rc == PSR_OK && b->surface.n_candidates == 0)
+		rc = psr_fail(b->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", b->mesh->n_triangles);
+	return rc;
 }
 
 static int choose(struct building *b, struct dpoint_set *set, struct dpoint_build_report *report)
 {
-	const struct dpoint_build_options *o = b->options;
-	const struct dpoint_cover_options cover = cover_options_of(o);
-	const struct dpoint_mesh_options mesh = {
-		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = o->piece, .delta = dpoint_delta_of_class(dpoint_delta_class((float)delta_of(o))), .grain_of = b->grain,
-		.cover = &cover,
-		.looks = LOOKS, .look = look_at, .userdata = b,
-	};
 	int rc;
 
-	say(b, "sample");
-	rc = dpoint_sample_mesh(&b->surface, b->mesh, &mesh, b->err);
-	if (rc == PSR_OK && b->surface.n_candidates == 0)
-		rc = psr_fail(b->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", b->mesh->n_triangles);
+	building_say(b, "sample");
+	rc = b->mesh->n_triangles > 0 ? put_mesh(b) : building_put_cloud(b);
 	if (rc != PSR_OK)
 		return rc;
-	say(b, "choose");
-	rc = dpoint_finish(set, report, &b->surface, b->two_sided, o);
+	building_say(b, "choose");
+	rc = dpoint_finish(set, report, &b->surface, b->two_sided, b->options);
+	report->n_flat = b->n_flat;
 	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "no memory for the points of %zu pieces", b->surface.n_cells);
 }
 
 int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, struct dpoint_surface *surface,
                   const uint8_t *two_sided, const struct dpoint_build_options *options)
 {
-	const struct dpoint_cover_options cover_options = cover_options_of(options);
+	const struct dpoint_cover_options cover_options = building_cover(options);
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
 	struct dpoint_errors errors;
@@ -189,6 +191,14 @@ int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, st
 	return rc;
 }
 
+static void widen(struct psr_model_info *info, const double at[3])
+{
+	for (int k = 0; k < 3; k++) {
+		info->box_min[k] = fmin(info->box_min[k], at[k]);
+		info->box_max[k] = fmax(info->box_max[k], at[k]);
+	}
+}
+
 static int describe(struct building *b)
 {
 	struct psr_model_info *info = b->info;
@@ -203,12 +213,10 @@ static int describe(struct building *b)
 		info->box_max[k] = -INFINITY;
 	}
 	for (uint32_t t = 0; t < b->mesh->n_triangles && rc == PSR_OK; t++)
-		for (int i = 0; i < 9; i++) {
-			const double x = b->mesh->position[b->mesh->triangle[t][i / 3]][i % 3];
-
-			info->box_min[i % 3] = fmin(info->box_min[i % 3], x);
-			info->box_max[i % 3] = fmax(info->box_max[i % 3], x);
-		}
+		for (int i = 0; i < 3; i++)
+			widen(info, b->mesh->position[b->mesh->triangle[t][i]]);
+	for (uint32_t i = 0; b->mesh->n_triangles == 0 && i < b->mesh->n_points && rc == PSR_OK; i++)
+		widen(info, b->mesh->point[i]);
 	return rc;
 }
 
@@ -220,8 +228,6 @@ int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct d
 	int rc = check_options(options, err);
 
 	memset(set, 0, sizeof *set);
-	if (rc == PSR_OK && mesh->n_triangles == 0)
-		rc = psr_fail(err, PSR_ERR_ARG, "differential points need triangles, and the file has points; build an octree");
 	if (rc == PSR_OK)
 		rc = describe(&b);
 	if (rc != PSR_OK)
@@ -230,12 +236,8 @@ int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct d
 	b.two_sided = calloc(mesh->n_materials, 1);
 	b.grain = calloc(mesh->n_materials, sizeof *b.grain);
 	rc = surface_init(&b.look, mesh, info->scale);
-	if (rc == PSR_OK && b.two_sided != NULL && b.grain != NULL)
-		rc = find_sides(&b);
-	else
+	if (rc == PSR_OK && (b.two_sided == NULL || b.grain == NULL))
 		rc = PSR_ERR_MEMORY;
-	if (rc == PSR_OK)
-		find_grains(&b);
 	rc = rc == PSR_OK ? choose(&b, set, report)
 	                  : psr_fail(err, rc, "no memory for a surface of %u triangles", mesh->n_triangles);
 	if (rc == PSR_OK)

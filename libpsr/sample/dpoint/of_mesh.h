@@ -1,4 +1,4 @@
-/* Differential points of meshes ([K] 4). */
+/* Differential points of meshes and clouds ([K] 4). */
 #ifndef PSR_SAMPLE_DPOINT_OF_MESH_H
 #define PSR_SAMPLE_DPOINT_OF_MESH_H
 
@@ -27,6 +27,7 @@ struct dpoint_build_report {
 	uint64_t n_candidates, n_kept;
 	uint64_t n_open;        /* pieces that no point covers: without an area, or bent as much as their sides are long */
 	uint64_t n_bad;         /* curvatures that could not be told; such places are flat */
+	uint64_t n_flat;        /* of these, points of a cloud whose neighbours are too few, or along a line */
 	double normal_rms, normal_worst; /* radians */
 	double height_worst;    /* inner units */
 	double off_worst;       /* no drawn place is further from the surface, pixels of the resolution */
@@ -46,7 +47,12 @@ struct dpoint_build_report {
  * error or a step of a word's place; report->n_over counts points for which it does not hold even there.
  * set->height is proven, with an error and without: at most a sixteenth too great.
  *
- * ARG: options out of range, no triangles; FORMAT: nothing is opaque; LIMIT, MEMORY. */
+ * A mesh without triangles is a cloud (dpoint/cloud.h): pieces are the squares around its points' discs, and what is
+ * told of the surface holds for these, where the points were. It is closed if it has no border and its neighbours face
+ * the same side; then, too, it is seen from its outside alone.
+ *
+ * ARG: options out of range, no extent; FORMAT: nothing is opaque, or no point of a cloud has a surface around it; LIMIT:
+ * as of dpoint_sample_mesh(), or more than DPOINT_MOST_CLOUD points; MEMORY. */
 int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct dpoint_build_report *report,
                    const struct psr_mesh *mesh, const struct dpoint_build_options *options, struct psr_error *err);
 

@@ -42,7 +42,7 @@ static void estimate(struct errors *e, const struct dpoint_patch *patch, double 
 	struct dpoint_local exact, local, other;
 	struct dpoint a, b;
 	struct dpoint_span span;
-	double step[2], first, across, uv[2] = { random_in(seed, 0.3, 0.7), random_in(seed, 0.3, 0.7) };
+	double off, step[2], first, across, uv[2] = { random_in(seed, 0.3, 0.7), random_in(seed, 0.3, 0.7) };
 
 	assert_true(dpoint_patch_span(&span, patch, 0));
 	assert_true(dpoint_patch_local(&exact, patch, &span, uv));
@@ -69,7 +69,7 @@ static void estimate(struct errors *e, const struct dpoint_patch *patch, double 
 		/* A normal that is off by some 10 degrees to begin with. */
 		v3d_add_scaled(local.axis[2], local.axis[2], 0.17, local.axis[0]);
 		v3d_normalize(local.axis[2], local.axis[2]);
-		assert_true(dpoint_shape_of_cloud(&local, around, (uint32_t)n));
+		assert_true(dpoint_shape_of_cloud(&local, &off, around, (uint32_t)n));
 	} else {
 		assert_true(dpoint_shape_of_ring(&local, around, (uint32_t)n));
 	}
@@ -123,23 +123,24 @@ static void open_shapes_are_refused(void **state)
 {
 	struct dpoint_local local = { { 0, 0, 0 }, { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 0, 0, 0 } };
 	struct dpoint_neighbour around[8];
+	double off;
 
 	(void)state;
 	memset(around, 0, sizeof around);
 	assert_false(dpoint_shape_of_ring(&local, around, 0));
 	assert_false(dpoint_shape_of_ring(&local, around, 8));
-	assert_false(dpoint_shape_of_cloud(&local, around, 8));
+	assert_false(dpoint_shape_of_cloud(&local, &off, around, 8));
 	/* Along a line, without normals. */
 	for (int i = 0; i < 8; i++)
 		around[i].at[0] = i - 3.5;
 	assert_false(dpoint_shape_of_ring(&local, around, 8));
-	assert_false(dpoint_shape_of_cloud(&local, around, 8));
+	assert_false(dpoint_shape_of_cloud(&local, &off, around, 8));
 	around[2].at[1] = NAN;
 	assert_false(dpoint_shape_of_ring(&local, around, 8));
-	assert_false(dpoint_shape_of_cloud(&local, around, 8));
+	assert_false(dpoint_shape_of_cloud(&local, &off, around, 8));
 	around[2].at[1] = INFINITY;
 	assert_false(dpoint_shape_of_ring(&local, around, 8));
-	assert_false(dpoint_shape_of_cloud(&local, around, 8));
+	assert_false(dpoint_shape_of_cloud(&local, &off, around, 8));
 }
 
 int main(void)
