@@ -12,7 +12,7 @@ fetched=${XDG_CACHE_HOME:-$HOME/.cache}/psr/models
 scans=$(ls "$fetched/dragon.ply" "$fetched/armadillo.off" "$fetched/bunny.obj" 2>/dev/null | tr '\n' ,)
 
 [ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-offsets \
-	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats
+	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats dpoint
 for study; do
 	echo "study $study" >&2
 	plot=()
