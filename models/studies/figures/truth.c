@@ -102,8 +102,6 @@ static void light_place(const struct job *job, const struct place *place, double
 		for (int c = 0; c < 3; c++)
 			light[c] += scene->light[l].color[c] * amount * part[c];
 	}
-	for (int c = 0; c < 3; c++)
-		light[c] = fmin(light[c], 1);
 }
 
 static void draw_pixel(const struct job *job, uint32_t x, uint32_t y)
