@@ -172,7 +172,10 @@ static void draw_lights(struct viewer *viewer)
 	}
 	for (uint32_t k = 0; k < subject->n_lights && !has_key; k++)
 		draw_light(viewer, k);
-	ImGui::TextDisabled("dir: point: X,Y,Z spot: X,Y,Z:TX,TY,TZ:DEG");
+	if (subject->n_lights > 0 && !has_key) {
+		ImGui::TextDisabled("dir:X,Y,Z  point:X,Y,Z");
+		ImGui::TextDisabled("spot:X,Y,Z:TX,TY,TZ:DEG");
+	}
 	ImGui::TextDisabled("L drag; Shift: turn a spot, point nearer");
 	if (ImGui::Checkbox("shadows", &is_shadowed))
 		subject->is_shadowed = is_shadowed;
