@@ -305,7 +305,7 @@ static void headings_stand_above_their_options_and_are_none(void **state)
 		{ .name = "big", .type = PSR_OPT_FLAG, .value = &flag, .help = "Big." },
 		{ .name = NULL },
 	};
-	static const struct psr_cli grouped = { "psr test", "Tests.", opts, NULL };
+	static const struct psr_cli grouped = { "psr test", "Tests.", opts, NULL, NULL };
 	struct psr_error err;
 	char text[4096];
 

@@ -417,7 +417,8 @@ static void options_outside_of_their_ranges_are_refused(void **state)
 {
 	(void)state;
 	static const struct psr_import_options bad[] = {
-		{ -0.1, 1, 0 }, { 3.2, 1, 0 }, { NAN, 1, 0 }, { 0.6, 0, 0 }, { 0.6, 257, 0 },
+		{ -0.1, 1, 0, 1024 }, { 3.2, 1, 0, 1024 }, { NAN, 1, 0, 1024 },  { 0.6, 0, 0, 1024 },
+		{ 0.6, 257, 0, 1024 }, { 0.6, 1, 0, 7 },    { 0.6, 1, 0, 8193 },
 	};
 
 	n_soup = 0;
