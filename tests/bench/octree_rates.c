@@ -330,7 +330,8 @@ int main(int argc, char **argv)
 		picture = option == 'o' ? optarg : picture;
 	}
 	if (optind + 1 != argc || bench.side < PART || bench.side > MOST_SIDE) {
-		fprintf(stderr, "octree_rates [-l LEVELS] [-s SIDE] [-o PICTURE.png] MESH; SIDE is %d to %d\n", PART, MOST_SIDE);
+		fprintf(stderr, "octree_rates [-l LEVELS] [-s SIDE] [-o PICTURE.png] MESH; SIDE is %d to %d\n", PART,
+		        MOST_SIDE);
 		return 2;
 	}
 	run(&bench, argv[optind], levels, picture);
