@@ -29,7 +29,7 @@ struct surveyor {
 	struct bins bins;
 	struct seen *seen; /* by group, of all instances */
 	size_t n_seen;
-	double n_left, apart2, spread; /* sums over tested samples in view: 1, squares for level 0 and their own */
+	double n_in_view, apart2, spread; /* sums over tested samples in view: 1, squares for level 0 and their own */
 	uint32_t n_spots;
 	struct spot spot[2 * MOST_BLOCKS];
 	uint8_t covered[GRID][GRID];
@@ -93,16 +93,34 @@ static uint64_t samples_of(const struct plan_instance *in, const struct psr_clus
 }
 
 /* The kernel's rectangle is about the middle of the block's sphere, but for what the picture cuts off. */
-static void add_spot(struct surveyor *s, const struct cull_batch *batch, uint32_t i, uint32_t n_samples, float grow)
+static struct spot spot_of(const struct cull_batch *batch, uint32_t i, uint32_t n_samples, float apart)
 {
-	struct spot *spot = &s->spot[s->n_spots];
+	return (struct spot){ (float)(batch->x0[i] + batch->x1[i] + 1) / 2, (float)(batch->y0[i] + batch->y1[i] + 1) / 2,
+		                  sqrtf((float)n_samples * SLANTED) * apart / 2 };
+}
 
+static void add_spot(struct surveyor *s, const struct spot *spot, float grow)
+{
 	if (s->n_spots == 2 * MOST_BLOCKS)
 		return;
-	s->n_spots++;
-	spot->x = (float)(batch->x0[i] + batch->x1[i] + 1) / 2;
-	spot->y = (float)(batch->y0[i] + batch->y1[i] + 1) / 2;
-	spot->half = sqrtf((float)n_samples * SLANTED) * batch->apart[i] * grow / 2;
+	s->spot[s->n_spots] = *spot;
+	s->spot[s->n_spots++].half *= grow;
+}
+
+static float length_within(float at, float half, uint32_t side)
+{
+	const float low = at - half, high = at + half;
+
+	return fmaxf((high < (float)side ? high : (float)side) - (low > 0 ? low : 0), 0);
+}
+
+/* Returns the part of a spot that is in the picture: little of a block that holds the eye. */
+static float part_in_view(const struct surveyor *s, const struct spot *spot)
+{
+	const float side = 2 * spot->half, width = length_within(spot->x, spot->half, s->plan.width),
+				height = length_within(spot->y, spot->half, s->plan.height);
+
+	return side > 0 ? (width / side) * (height / side) : 1;
 }
 
 struct axis {
@@ -159,9 +177,10 @@ static void see_cluster(struct surveyor *s, const struct plan_instance *in, cons
                         uint32_t stride)
 {
 	struct seen *seen = &s->seen[in->first_group + k->group];
-	const float grow = sqrtf((float)stride);
+	/* Where a block holds the eye, its samples may be a million pixels apart. */
+	const float most_apart = (float)(s->plan.width + s->plan.height), grow = sqrtf((float)stride);
 	uint64_t n_all = 0, n_left = 0;
-	float apart2 = 0;
+	double n_in_view = 0, apart2 = 0;
 
 	for (uint32_t at = 0; at < k->n_blocks; at += stride * RUN) {
 		const uint32_t first = k->first_block + at, n = k->n_blocks - at < RUN ? k->n_blocks - at : RUN;
@@ -174,16 +193,21 @@ static void see_cluster(struct surveyor *s, const struct plan_instance *in, cons
 			n_all += n_samples;
 			if (!batch.is_left[i])
 				continue;
+			const float apart = fminf(batch.apart[i], most_apart);
+			const struct spot spot = spot_of(&batch, i, n_samples, apart);
+			const double n = (double)n_samples * (double)part_in_view(s, &spot);
+
 			n_left += n_samples;
-			apart2 += (float)n_samples * batch.apart[i] * batch.apart[i] / (float)(1 << 2 * k->level);
-			add_spot(s, &batch, i, n_samples, grow);
+			n_in_view += n;
+			apart2 += n * (double)(apart * apart) / (double)(1 << 2 * k->level);
+			add_spot(s, &spot, grow);
 		}
 	}
-	s->n_left += (double)n_left;
-	s->apart2 += (double)apart2;
-	s->spread += (double)apart2 * (1 << 2 * k->level);
+	s->n_in_view += n_in_view;
+	s->apart2 += apart2;
+	s->spread += apart2 * (1 << 2 * k->level);
 	seen->share = n_all > 0 ? (float)n_left / (float)n_all : 0;
-	seen->apart2 = n_left > 0 ? apart2 / (float)n_left : 0;
+	seen->apart2 = n_left > 0 ? (float)(apart2 / (double)n_left) : 0;
 }
 
 /* Calls for each cluster that is drawn at the levels which were chosen last. */
@@ -221,14 +245,14 @@ static void count(struct survey *survey, struct surveyor *s, const double *densi
 	uint32_t stride = 1;
 
 	s->n_spots = 0;
-	s->n_left = s->apart2 = s->spread = 0;
+	s->n_in_view = s->apart2 = s->spread = 0;
 	s->plan.finer = 1;
 	cull_choose_levels(&s->bins, &s->plan);
 	for (uint64_t left = each_drawn(s, NULL, 0, 1); left > MOST_BLOCKS; left /= 2)
 		stride *= 2;
 	each_drawn(s, NULL, stride, 1);
 	survey->area = s->n_spots > 0 ? cover(s) : 0;
-	survey->apart = s->n_left > 0 ? sqrt(s->apart2 / s->n_left) : 0;
+	survey->apart = s->n_in_view > 0 ? sqrt(s->apart2 / s->n_in_view) : 0;
 	survey->layers = survey->area > 0 ? (double)SLANTED * stride * s->spread / survey->area : 0;
 	for (int i = 0; i < n; i++) {
 		struct survey_counts *counts = &survey->at[i];

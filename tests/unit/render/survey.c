@@ -190,6 +190,26 @@ static void large_scenes_are_left_alone(void **state)
 	free(instance);
 }
 
+/* Samples of a block that holds the eye may be a million pixels apart, and most of them are out of view. */
+static void blocks_at_the_eye_tell_little(void **state)
+{
+	const struct psr_instance instance = { .model = teapot, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	uint64_t random = 5;
+
+	(void)state;
+	for (int i = 0; i < 2000; i++) {
+		struct psr_scene scene;
+		struct survey survey;
+
+		look(&scene, &instance, &random);
+		for (int k = 0; k < 3; k++) /* into the model */
+			scene.camera.eye[k] += (scene.camera.target[k] - scene.camera.eye[k]) * random_in(&random, 0.6, 1);
+		assert_int_equal(survey_scene(&survey, surveyor, &scene, WIDTH, HEIGHT, densities, N), 1);
+		assert_true(survey.apart >= 0 && survey.apart <= WIDTH + HEIGHT);
+		assert_true(survey.layers >= 0 && survey.layers < 1000);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -199,6 +219,7 @@ int main(void)
 		cmocka_unit_test(the_area_of_octrees_is_about_that_of_the_frame),
 		cmocka_unit_test(nothing_in_view_is_nothing),
 		cmocka_unit_test(large_scenes_are_left_alone),
+		cmocka_unit_test(blocks_at_the_eye_tell_little),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);
