@@ -195,11 +195,11 @@ static void see_cluster(struct surveyor *s, const struct plan_instance *in, cons
 				continue;
 			const float apart = fminf(batch.apart[i], most_apart);
 			const struct spot spot = spot_of(&batch, i, n_samples, apart);
-			const double n = (double)n_samples * (double)part_in_view(s, &spot);
+			const double in_view = (double)n_samples * (double)part_in_view(s, &spot);
 
 			n_left += n_samples;
-			n_in_view += n;
-			apart2 += n * (double)(apart * apart) / (double)(1 << 2 * k->level);
+			n_in_view += in_view;
+			apart2 += in_view * (double)(apart * apart) / (double)(1 << 2 * k->level);
 			add_spot(s, &spot, grow);
 		}
 	}

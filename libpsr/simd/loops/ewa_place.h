@@ -252,8 +252,12 @@ static inline void ewa_find_pixels(struct ewa_leaves *l, const struct warp_targe
 /* Finds all that a batch's splats need but their looks. */
 static inline void ewa_place(struct ewa_leaves *l, const struct warp_target *t)
 {
-	for (uint32_t i = l->n; i < ewa_lanes(l); i++)
-		l->at[2][i] = 0;
+	for (uint32_t i = l->n; i < ewa_lanes(l); i++) { /* nothing is computed of what memory held */
+		for (int k = 0; k < 3; k++)
+			l->at[k][i] = l->normal[k][i] = 0;
+		l->edge[i] = 0;
+		l->kind[i] = 0;
+	}
 	ewa_project(l, t);
 	ewa_shape(l, t->perspective);
 	ewa_quantise(l);
