@@ -110,7 +110,6 @@ int dpoint_sample_cloud(struct dpoint_surface *surface, struct dpoint_cloud_repo
 		rc = cloud_fit_all(fit, cloud, cover, delta, pool);
 	for (uint32_t i = 0; i < cloud->n && rc == PSR_OK; i++) {
 		report->n_flat += fit[i].state == CLOUD_FLAT;
-		report->n_border += (uint32_t)fit[i].has_border;
 		report->is_closed &= !fit[i].has_border && fit[i].state != CLOUD_FLAT && !is_opposed(cloud, fit, i);
 		rc = put_point(surface, cloud, i, &fit[i], delta);
 	}

@@ -19,7 +19,6 @@ struct dpoint_cloud {
 
 struct dpoint_cloud_report {
 	uint32_t n_flat;          /* points whose neighbours tell no curvature: too few, along a line */
-	uint32_t n_border;        /* beside which the surface ends */
 	int is_closed;            /* it ends nowhere, and neighbours face the same side: there is an outside */
 };
 

@@ -8,8 +8,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
+#include "around.h"
+#include "base/clock.h"
 #include "base/stats.h"
 #include "base/vec.h"
 #include "model/points.h"
@@ -65,22 +66,6 @@ static int make_diffuse(struct psr_model **out, const struct psr_model *model, s
 	return rc;
 }
 
-/* Looks from one of the directions around the object. */
-static void place_camera(struct psr_camera *camera, const struct psr_model_info *info, int direction, double distance)
-{
-	double away[3];
-
-	psr_camera_frame(camera, info->box_min, info->box_max, info->up, 0.7, (double)WIDTH / HEIGHT);
-	v3d_sub(away, camera->eye, camera->target);
-	for (int i = 0; i < direction; i++) { /* a quarter around the way up, if that is y */
-		const double x = away[0];
-
-		away[0] = away[2];
-		away[2] = -x;
-	}
-	v3d_add_scaled(camera->eye, camera->target, distance, away);
-}
-
 /* The unit sphere is then as many pixels high as the model's resolution says. */
 static double distance_of(const struct psr_model_info *info, double distance)
 {
@@ -97,10 +82,7 @@ static double distance_of(const struct psr_model_info *info, double distance)
 /* Of all threads: it does not grow while others use the cores. */
 static double processor_ms(void)
 {
-	struct timespec now;
-
-	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-	return (double)now.tv_sec * 1e3 + (double)now.tv_nsec * 1e-6;
+	return (double)clock_read(CLOCK_PROCESS_CPUTIME_ID) * 1e-6;
 }
 
 static int draw(struct times *times, struct bench *bench, enum psr_isa isa, int look, int direction, double distance,
@@ -116,7 +98,7 @@ static int draw(struct times *times, struct bench *bench, enum psr_isa isa, int 
 	double ns = 0, start;
 	int rc;
 
-	place_camera(&scene.camera, info, direction, distance);
+	around_camera(&scene.camera, info, direction, distance, (double)WIDTH / HEIGHT);
 	psr_light_key(&light, &scene.camera);
 	light.casts_shadow = 0;
 	psr_settings_default(&settings, WIDTH, HEIGHT);

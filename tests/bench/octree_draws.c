@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "around.h"
 #include "base/stats.h"
-#include "base/vec.h"
 #include "import/cloud/las_source.h"
 #include "model/blocks.h"
 #include "model/cubes.h"
@@ -101,23 +101,6 @@ struct bench {
 	uint32_t side;
 };
 
-/* Looks from one of the directions around the object. */
-static void place_camera(struct psr_scene *scene, const struct psr_model_info *info, int direction, double distance)
-{
-	struct psr_camera *camera = &scene->camera;
-	double away[3];
-
-	psr_camera_frame(camera, info->box_min, info->box_max, info->up, 0.7, 1);
-	v3d_sub(away, camera->eye, camera->target);
-	for (int i = 0; i < direction; i++) { /* a quarter around the way up, if that is y */
-		const double x = away[0];
-
-		away[0] = away[2];
-		away[2] = -x;
-	}
-	v3d_add_scaled(camera->eye, camera->target, distance, away);
-}
-
 static int draw(struct times *times, const struct bench *bench, const struct subject *subject, int direction,
                 double distance, struct psr_error *err)
 {
@@ -131,7 +114,7 @@ static int draw(struct times *times, const struct bench *bench, const struct sub
 	struct psr_settings settings;
 	int rc;
 
-	place_camera(&scene, info, direction, distance);
+	around_camera(&scene.camera, info, direction, distance, 1);
 	psr_light_key(&light, &scene.camera);
 	light.casts_shadow = 0;
 	psr_settings_default(&settings, bench->side, bench->side);
