@@ -23,6 +23,7 @@ const struct truth_row truth_rows[] = {
 	{ "raw", "the same without smoothing", 256, 256, 1, VIEWS, 4, 0, 0, { "--no-smooth", NULL }, NULL },
 	{ "double", "magnification 2, 512x512, no smoothing: the tables of figures gaps, fill and threshold", 256, 512, 2,
 	  VIEWS, 4, 0, 0, { "--no-smooth", NULL }, "dragon toybird" },
+	{ "smooth", "the same, as psr shot draws without options", 256, 512, 2, VIEWS, 4, 0, 0, { NULL }, "dragon toybird" },
 	{ "shadows", "magnification 1, 256x256, the light casts shadows", 256, 256, 1, 3, 4, 1, 0, { NULL }, NULL },
 	{ "lamps", "the same, lit by two lamps near it", 256, 256, 1, 3, 4, 1, 1, { NULL }, NULL },
 	{ "close", "magnification 4 of a model of 1024, 256x256, with shadows", 1024, 256, 4, 2, 4, 1, 0, { NULL },
