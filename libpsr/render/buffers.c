@@ -15,14 +15,20 @@ static uint32_t offcut_stride(const struct plan *plan)
 	return plan->with_splats ? (plan->width + 7) / 8 : 0;
 }
 
+static size_t n_bands_most(const struct plan *plan)
+{
+	return (size_t)plan->tiles_x * plan->tiles_y * BANDS_MOST;
+}
+
 /* Points the arrays into their two pieces of memory. */
 static void place(struct buffers *b, const struct plan *plan, size_t n_words)
 {
 	const size_t area = (size_t)plan->width * plan->height, rows = n_brick_rows(plan);
 	struct psr_zstack *stack = &b->stack;
 
-	b->tile = b->counters;
-	b->shade = (struct shade_counts *)(b->tile + (size_t)plan->tiles_x * plan->tiles_y);
+	b->warp = b->counters;
+	b->band = (struct band *)(b->warp + n_bands_most(plan));
+	b->shade = (struct shade_counts *)(b->band + n_bands_most(plan));
 	b->gaps = (struct gaps_counts *)(b->shade + rows);
 	b->is_clean = (uint8_t *)(b->gaps + rows);
 	stack->word = b->pixels;
@@ -38,7 +44,7 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 {
 	const uint32_t w = plan->width, h = plan->height;
 	const size_t area = (size_t)w * h, rows = n_brick_rows(plan), n_bricks = rows * bricks_x(plan);
-	const size_t n_tiles = (size_t)plan->tiles_x * plan->tiles_y, n_parts = (size_t)plan->parts_x * plan->parts_y;
+	const size_t n_parts = (size_t)plan->parts_x * plan->parts_y;
 	struct psr_zstack *stack = &b->stack;
 	const size_t n_cells = zbuffer_measure(stack, w, h, levels & ~1u);
 
@@ -49,7 +55,8 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 	                          n_words * sizeof *stack->word + area * 4 * sizeof *b->weight + n_cells * sizeof(float)
 	                              + n_bricks + (size_t)offcut_stride(plan) * h);
 	b->counters = psr_grow_huge(b->counters, &b->counters_size,
-	                            n_tiles * sizeof *b->tile + n_parts + rows * (sizeof *b->gaps + sizeof *b->shade));
+	                            n_bands_most(plan) * (sizeof *b->band + sizeof *b->warp) + n_parts
+	                                + rows * (sizeof *b->gaps + sizeof *b->shade));
 	if (plan->with_ewa)
 		b->sum = psr_grow_huge(b->sum, &b->sum_size, area * sizeof *b->sum);
 	if (b->pixels == NULL || b->counters == NULL || (plan->with_ewa && b->sum == NULL))

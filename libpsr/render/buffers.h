@@ -15,7 +15,8 @@ struct buffers {
 	struct splat_offcuts offcuts; /* of plans with splats */
 	struct ewa_sum *sum;       /* of plans with EWA splats */
 	size_t sum_size;
-	struct warp_counts *tile;
+	struct band *band;          /* what the warp's threads draw */
+	struct warp_counts *warp;   /* of each band */
 	struct gaps_counts *gaps;   /* by row of bricks, */
 	struct shade_counts *shade; /* like this */
 	/* By part of the picture, 1: an earlier frame of the same layout left its words empty. If all parts of a tile are

@@ -10,7 +10,8 @@ static void warp_one(int i, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	struct buffers *b = &r->buffers;
-	const uint32_t tile = (uint32_t)r->bins.by_work[i];
+	const struct band *band = &b->band[i];
+	const uint32_t tile = band->tile;
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	const uint32_t clean = warp_parts(&r->plan, b->is_clean, tile);
 	const struct warp_into into = { &b->stack, clean, NULL, b->sum };
@@ -18,11 +19,13 @@ static void warp_one(int i, void *userdata)
 	const unsigned cut_below = r->inside != NULL ? r->inside->pass : 0;
 	const struct splat_into discs = { &b->stack, clean, b->offcuts, cut_below };
 
-	b->tile[tile] = (struct warp_counts){ 0, 0, 0 };
+	b->warp[i] = (struct warp_counts){ 0, 0, 0 };
 	if (r->plan.with_splats)
-		b->tile[tile] = splat_tile(r->simd, &r->plan, &r->bins, &discs, tile);
+		b->warp[i] = splat_tile(r->simd, &r->plan, &r->bins, &discs, tile);
+	else if (band->y1 - band->y0 < TILE_HEIGHT)
+		b->warp[i] = warp_band(r->simd, &r->plan, &r->bins, &into, band);
 	else if (!is_empty || clean != ALL_PARTS)
-		b->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &into, tile);
+		b->warp[i] = warp_tile(r->simd, &r->plan, &r->bins, &into, tile);
 	if (r->plan.with_ewa && !is_empty)
 		ewa_tile(r->simd, &r->plan, &r->bins, &into, tile);
 }
@@ -32,19 +35,19 @@ static int warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr_
 {
 	const struct plan *plan = &r->plan;
 	struct buffers *b = &r->buffers;
-	const int n_tiles = (int)(plan->tiles_x * plan->tiles_y);
+	const int n = (int)bands_make(b->band, plan, &r->bins, b->stack.levels, psr_pool_threads(pool));
 	uint64_t n_occluded = 0;
 	int with_occlusion = 0;
 
-	if (psr_pool_for_until(pool, &plan->cancel, n_tiles, warp_one, r)) {
+	if (psr_pool_for_until(pool, &plan->cancel, n, warp_one, r)) {
 		buffers_forget(b);
 		return PSR_ERR_CANCELLED;
 	}
 	memcpy(b->is_clean, r->bins.is_quiet, (size_t)plan->parts_x * plan->parts_y);
-	for (int t = 0; t < n_tiles; t++) {
-		report->count[PSR_STAGE_WARP] += b->tile[t].n_inside;
-		n_occluded += b->tile[t].n_occluded;
-		with_occlusion |= b->tile[t].with_occlusion;
+	for (int i = 0; i < n; i++) {
+		report->count[PSR_STAGE_WARP] += b->warp[i].n_inside;
+		n_occluded += b->warp[i].n_occluded;
+		with_occlusion |= b->warp[i].with_occlusion;
 	}
 	const enum psr_why no_occlusion = plan->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF;
 	effect_note(report, PSR_EFFECT_OCCLUSION, with_occlusion ? PSR_WHY_RAN : no_occlusion, n_occluded);

@@ -201,6 +201,7 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	plan->n_samples = 0;
 	plan->has_octrees = n_octrees > 0;
 	plan->has_points = n_points > 0;
+	plan->only_points = n_points > 0 && n_points == scene->n_instances;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		const struct psr_blocks *blocks = instance_groups(&scene->instance[i]);
 		const struct psr_cubes *cubes = instance_cubes(&scene->instance[i]);

@@ -56,6 +56,7 @@ struct plan {
 	int has_thin;                      /* a sheer block in view is of thin things */
 	int has_tint;                      /* an instance is not drawn in its own colours */
 	int has_octrees, has_points;       /* an instance is drawn as one, or as differential points */
+	int only_points;                   /* all are drawn as these */
 	int caster;                        /* of a shadow map, SHADOW_OPAQUE or a class of glass; of a picture NO_CASTER */
 	struct strip_light *light;
 	/* By light, SHADOW_CASTERS each, or NULL: no shadows; and the share of the light that each caster keeps back. The

@@ -1,8 +1,6 @@
 #include "sheer.h"
 #include "warp.h"
 
-#define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
-
 #define RUN 1024     /* blocks warped between two questions */
 #define POINTS_RUN 256 /* differential points, each of which may cover the tile */
 
@@ -117,11 +115,68 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	warp_target_make(&target, plan, into->stack, tile, into->own);
 	target.clean = into->clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
-	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full)) {
+	if (warp_looks(plan, end - begin)) {
 		simd->warp_clear(&target, into->stack->levels);
 		counts = warp_near_to_far(simd, plan, bins, &target, begin, end);
 	} else {
 		counts.n_inside = warp_in_turn(simd, plan, &target, into->stack->levels, bins->entry + begin, end - begin);
 	}
+	return counts;
+}
+
+/* Entries that reach into rows above the band are counted there. */
+struct waiting {
+	struct bin_entry entry[256];
+	uint32_t n;
+};
+
+static uint64_t warp_waiting(const struct simd *simd, const struct plan *plan, const struct warp_target *t,
+                             struct waiting *waiting)
+{
+	const uint32_t n = waiting->n;
+
+	waiting->n = 0;
+	return warp_entries(simd, plan, t, waiting->entry, n);
+}
+
+static void warp_target_cut(struct warp_target *t, const struct band *band)
+{
+	const int32_t top = t->y0 + band->y0, bottom = t->y0 + band->y1 < t->y1 ? t->y0 + band->y1 : t->y1;
+
+	t->above = top - t->y0;
+	t->below = t->y1 - bottom;
+	t->word += (size_t)t->above * t->stride;
+	t->y0 = top;
+	t->y1 = bottom;
+}
+
+struct warp_counts warp_band(const struct simd *simd, const struct plan *plan, const struct bins *bins,
+                             const struct warp_into *into, const struct band *band)
+{
+	struct waiting counted = { .n = 0 }, again = { .n = 0 };
+	struct warp_counts counts = { 0, 0, 0 };
+	struct warp_target t;
+
+	warp_target_make(&t, plan, into->stack, band->tile, into->own);
+	warp_target_cut(&t, band);
+	t.clean = into->clean >> part_shift(band->y0);
+	t.bare = 0;
+	simd->warp_clear(&t, 0);
+	for (uint32_t e = bins->tile_begin[band->tile]; e < bins->tile_begin[band->tile + 1]; e++) {
+		const struct cull_hit *hit = &bins->hit[bins->entry[e].hit];
+		struct waiting *to = hit->y0 < t.y0 && t.above > 0 ? &again : &counted;
+
+		if (plan_is_cancelled_at(plan, e))
+			return counts;
+		if (hit->y1 < t.y0 || hit->y0 >= t.y1)
+			continue;
+		to->entry[to->n++] = bins->entry[e];
+		if (to->n < sizeof to->entry / sizeof to->entry[0])
+			continue;
+		const uint64_t n_inside = warp_waiting(simd, plan, &t, to);
+		counts.n_inside += to == &counted ? n_inside : 0;
+	}
+	warp_waiting(simd, plan, &t, &again);
+	counts.n_inside += warp_waiting(simd, plan, &t, &counted);
 	return counts;
 }

@@ -2,7 +2,7 @@
 #ifndef PSR_RENDER_WARP_H
 #define PSR_RENDER_WARP_H
 
-#include "bins.h"
+#include "bands.h"
 #include "zbuffer.h"
 
 struct warp_counts {
@@ -26,6 +26,10 @@ uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const st
 /* Clears a tile, and draws its blocks; some of them if the frame is cancelled. */
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile);
+
+/* Clears a band that is a part of its tile, and draws it. */
+struct warp_counts warp_band(const struct simd *simd, const struct plan *plan, const struct bins *bins,
+                             const struct warp_into *into, const struct band *band);
 
 /* Draws the blocks `begin` .. `end` - 1 of the bins into a cleared tile from near to far, skipping blocks that the tile
  * already hides. */

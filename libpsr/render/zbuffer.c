@@ -52,6 +52,7 @@ void warp_target_make(struct warp_target *t, const struct plan *plan, const stru
 	int last_x = tx + 1 == plan->tiles_x, last_y = ty + 1 == plan->tiles_y;
 	t->x1 = last_x ? (int32_t)plan->width : t->x0 + TILE_WIDTH;
 	t->y1 = last_y ? (int32_t)plan->height : t->y0 + TILE_HEIGHT;
+	t->above = t->below = 0;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(stack->levels >> k & 1))
 			continue;

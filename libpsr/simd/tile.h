@@ -18,4 +18,10 @@ static inline uint32_t part_bit(uint32_t x, uint32_t y)
 	return 1u << (y / PART_HEIGHT * (TILE_WIDTH / PART_WIDTH) + x / PART_WIDTH);
 }
 
+/* How far the bits of rows from y on are above those of the tile's first ones. */
+static inline uint32_t part_shift(uint32_t y)
+{
+	return y / PART_HEIGHT * (TILE_WIDTH / PART_WIDTH);
+}
+
 #endif

@@ -92,6 +92,7 @@ struct warp_target {
 	uint64_t *word; /* the word of pixel (x0, y0); kernels leave the gaps between rows alone */
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
+	int32_t above, below; /* rows of the tile that are not the target's: differential points are counted there, too */
 	uint32_t clean; /* bits of parts whose words are empty before the tile is cleared */
 	uint32_t bare;  /* bits of parts where nothing is drawn */
 	struct ewa_sum *sum; /* of pixel (x0, y0), for ewa_sums */

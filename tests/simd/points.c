@@ -111,6 +111,10 @@ static void points(struct check *c, struct picture *p, uint32_t n_entries, uint3
 
 	t->perspective = check_one_in(c, 4) ? 0 : 1;
 	t->near_z = 0x1p-14f;
+	if (check_one_in(c, 3)) {
+		t->above = (int32_t)check_below(c, TILE_HEIGHT);
+		t->below = (int32_t)check_below(c, TILE_HEIGHT);
+	}
 	place_scene(c, s, t, numbers);
 	t->instance = &s->in;
 	for (uint32_t e = 0; e < n_entries; e++) {

@@ -154,6 +154,21 @@ static inline int32_t points_pixel(float x, int32_t low, int32_t high)
 	return psr_floor_int((x < most ? x : most) - 0.5f) + 1;
 }
 
+/* Counts the points that may be in the tile, of all of its rows. */
+static inline uint32_t count_points(const struct points_batch *b, const struct warp_target *t)
+{
+	const int32_t top = t->y0 - t->above, bottom = t->y1 + t->below;
+	uint32_t n_inside = 0;
+
+	for (uint32_t i = 0; i < b->p.n; i++) {
+		const int32_t y0 = points_pixel(b->low[1][i] - POINTS_ROUNDING, top, bottom);
+		const int32_t y1 = points_pixel(b->high[1][i] + POINTS_ROUNDING, top, bottom);
+
+		n_inside += (b->x0[i] < b->x1[i]) & (y0 < y1);
+	}
+	return n_inside;
+}
+
 /* Returns how many points may be in the tile. few: fronts of points with at most as many pixels are told apart. */
 static inline uint32_t sort_points(struct points_batch *b, const struct warp_target *t, int32_t few)
 {
@@ -176,7 +191,7 @@ static inline uint32_t sort_points(struct points_batch *b, const struct warp_tar
 		n_inside += is_inside;
 		b->sides[i] = (0u - is_inside) & ((b->away[0][i] <= 0 ? front : 0) | (has_back ? POINTS_BACK : 0));
 	}
-	return n_inside;
+	return t->above + t->below > 0 ? count_points(b, t) : n_inside;
 }
 
 #endif
