@@ -1,4 +1,4 @@
-#include "bands.h"
+#include "warp.h"
 
 #define LEAST_ENTRIES 64 /* of a tile that is cut: a few microseconds of work */
 
@@ -41,18 +41,10 @@ static void cut(struct band *out, uint32_t *n, const struct plan *plan, const st
 	put(out, n, tile, first, n_parts);
 }
 
-int warp_looks(const struct plan *plan, uint32_t n)
-{
-	const uint32_t least = 6144; /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
-
-	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least || plan->is_full);
-}
-
 uint32_t bands_make(struct band *out, const struct plan *plan, const struct bins *bins, uint32_t levels, int n_threads)
 {
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, share = bins->tile_begin[n_tiles] / (uint32_t)n_threads;
-	const int may_cut = n_threads > 1 && plan->only_points && !levels && !plan->with_splats && !plan->with_ewa
-	                    && !plan->has_sheer;
+	const int may_cut = n_threads > 1 && plan->only_points && !levels && !plan->with_splats && !plan->has_sheer;
 	uint32_t n = 0;
 
 	for (uint32_t i = 0; i < n_tiles; i++) {

@@ -17,7 +17,4 @@ struct band {
  * are, at most BANDS_MOST a tile. */
 uint32_t bands_make(struct band *out, const struct plan *plan, const struct bins *bins, uint32_t levels, int n_threads);
 
-/* Whether the warp leaves out what it finds hidden in a tile of n entries: then it draws the tile from near to far. */
-int warp_looks(const struct plan *plan, uint32_t n);
-
 #endif

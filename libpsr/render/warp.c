@@ -105,6 +105,13 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct plan *plan, c
 	return n_inside;
 }
 
+int warp_looks(const struct plan *plan, uint32_t n)
+{
+	const uint32_t least = 6144; /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
+
+	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least || plan->is_full);
+}
+
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile)
 {
