@@ -11,7 +11,7 @@ struct stream {
 	const char *name, *key;
 	double bits, packed; /* packed: in the file, 0 where that is not packed as an octree */
 };
-#define N_STREAMS 6
+#define N_STREAMS 7
 
 static void take_streams(struct stream streams[N_STREAMS], const struct octree *tree, const struct octree_shares *shares)
 {
@@ -22,10 +22,20 @@ static void take_streams(struct stream streams[N_STREAMS], const struct octree *
 	streams[2] = (struct stream){ "normals", "normals", tree->normal != NULL ? 16.0 : 0.0, 0 };
 	streams[3] = (struct stream){ "offsets", "offsets", tree->offset != NULL ? 8.0 : 0.0, 0 };
 	streams[4] = (struct stream){ "colours", "colors", tree->color != NULL ? 24.0 : 0.0, 0 };
-	streams[5] = (struct stream){ "coarser levels", "coarser", 0.0, 8.0 * (double)shares->coarser / n };
+	streams[5] = (struct stream){ "materials", "materials", tree->material != NULL ? 24.0 : 0.0, 0 };
+	streams[6] = (struct stream){ "coarser levels", "coarser", 0.0, 8.0 * (double)shares->coarser / n };
 	streams[0].packed = 8.0 * (double)shares->codes / n;
 	for (int i = 0; i < OCTREE_STREAMS; i++)
 		streams[2 + i].packed = 8.0 * (double)shares->stream[i] / n;
+}
+
+/* Of a sample's attributes (model/blocks.h). */
+static void print_material(uint32_t material)
+{
+	const double root = fmin((material >> 5 & 31) / 30.0, 1);
+
+	printf("  %-14s  metallic %.2f, reflectance %.3f, roughness %.2f\n", "one material", (material & 31) / 31.0,
+	       root * root, (material >> 16) / 255.0);
 }
 
 void info_print_octree(const struct octree *tree, const struct octree_shares *shares, double scale)
@@ -44,6 +54,8 @@ void info_print_octree(const struct octree *tree, const struct octree_shares *sh
 	}
 	printf("  %-14s  %.2f bits a leaf", "all", bits);
 	printf(shares->codes > 0 ? ", %.2f packed\n" : "\n", packed);
+	if (tree->one_material != NULL)
+		print_material(octree_material(tree, 0));
 	info_print_scan(tree);
 }
 
@@ -72,6 +84,8 @@ cJSON *info_octree_json(const struct octree *tree, const struct octree_shares *s
 uint64_t info_octree_drawn(const struct octree *tree)
 {
 	const int has_offset = tree->normal != NULL && tree->offset != NULL;
+	const int has_material = tree->material != NULL || tree->one_material != NULL;
 
-	return psr_cubes_guess(tree, (tree->normal != NULL ? 2 : 0) + (tree->color != NULL ? 3 : 0) + (has_offset ? 1 : 0));
+	return psr_cubes_guess(tree, (tree->normal != NULL ? 2 : 0) + (tree->color != NULL ? 3 : 0) + (has_offset ? 1 : 0)
+	                             + (has_material ? 3 : 0));
 }

@@ -65,6 +65,9 @@ static struct octree *make_tree(const struct cubes_making *m, int level)
 		is_done &= (tree->color = malloc(tree->n_leaves * sizeof *tree->color)) != NULL;
 	if (finest->normal != NULL && finest->offset != NULL)
 		is_done &= (tree->offset = malloc(tree->n_leaves)) != NULL;
+	/* Lobes widen by level: one material of all leaves is none of all nodes. */
+	if (finest->material != NULL || finest->one_material != NULL)
+		is_done &= (tree->material = malloc(tree->n_leaves * sizeof *tree->material)) != NULL;
 	if (finest->scan.intensity != NULL)
 		is_done &= (tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity)) != NULL;
 	if (finest->scan.class != NULL)
@@ -81,6 +84,7 @@ static uint64_t bytes_of(const struct octree *tree)
 {
 	const struct octree_scan *scan = &tree->scan;
 	const uint64_t leaf = (tree->normal != NULL ? 2 : 0) + (tree->color != NULL ? 3 : 0) + (tree->offset != NULL)
+	                      + (tree->material != NULL ? 3 : 0)
 	                      + (scan->intensity != NULL ? 2 : 0) + (scan->class != NULL) + (scan->returns != NULL);
 
 	return sizeof *tree + tree->n_codes + tree->n_skips * sizeof *tree->skip + tree->n_leaves * leaf;

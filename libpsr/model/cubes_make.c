@@ -139,6 +139,8 @@ static void average(const struct subtree *s, int level, uint64_t leaf, uint64_t 
 			tree->normal[leaf] = octree_mean_normal(finer->normal + finer_leaf, n);
 		if (tree->color != NULL)
 			octree_mean_color(tree->color[leaf], (const uint8_t(*)[3])finer->color + finer_leaf, n);
+		if (tree->material != NULL)
+			octree_put_material(tree->material[leaf], octree_mean_material(finer, finer_leaf, n));
 		if (tree->offset != NULL)
 			tree->offset[leaf] = (uint8_t)octree_mean_offset(code, tree->normal[leaf], finer->normal + finer_leaf,
 			                                                 finer->offset + finer_leaf);

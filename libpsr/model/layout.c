@@ -55,6 +55,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	TREE("ONRM", COUNT_LEAVES, 2, normal),
 	TREE("OOFF", COUNT_LEAVES, 1, offset),
 	TREE("OCOL", COUNT_LEAVES, 3, color),
+	[SECTION_MATERIAL] = TREE("OMAT", COUNT_LEAVES, 3, material),
 	[SECTION_CALIBRATION] = { "CALB", 1, 0, COUNT_CALIBRATED, CALIBRATED_BYTES, 0 },
 	[SECTION_POINTS] = { "DPNT", 1, 0, COUNT_ONE, POINTS_BYTES, 0 },
 	SET("DGRP", COUNT_GROUPS, 32, group),
@@ -66,6 +67,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	TREE("OTSC", COUNT_ONE, 16, scan.time_scale),
 	[SECTION_CALIBRATION_FINE] = { "CALF", 1, 0, COUNT_CALIBRATED, CALIBRATED_FINE_BYTES,
 	                               offsetof(struct content, calibration) + offsetof(struct psr_calibration, fine) },
+	[SECTION_ONE_MATERIAL] = TREE("OMT1", COUNT_ONE, 3, one_material),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -288,6 +290,8 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 /* The first version that knows all sections. */
 static unsigned minor_of(const struct content *content)
 {
+	if (is_present(SECTION_MATERIAL, content) || is_present(SECTION_ONE_MATERIAL, content))
+		return FILE_MINOR_MATERIAL;
 	for (int k = SECTION_FIRST_OF_SCAN; k < SECTION_END_OF_SCAN; k++)
 		if (is_present(k, content))
 			return FILE_MINOR_SCAN;

@@ -8,7 +8,8 @@ static unsigned leaf_bytes(const uint8_t *table, uint64_t n_sections, int *has_n
 	static const struct {
 		char type[5];
 		unsigned bytes;
-	} of[] = { { "ONRM", 2 }, { "OOFF", 1 }, { "OCOL", 3 }, { "OINT", 2 }, { "OCLS", 1 }, { "ORET", 1 } };
+	} of[] = { { "ONRM", 2 }, { "OOFF", 1 }, { "OCOL", 3 }, { "OMAT", 3 }, { "OMT1", 3 },
+	         { "OINT", 2 }, { "OCLS", 1 }, { "ORET", 1 } };
 	unsigned bytes = 0;
 
 	*has_normal = 0;

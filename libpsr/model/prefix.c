@@ -260,6 +260,7 @@ int unpack_prefix(struct unpacker *u, uint8_t **image, struct pack_facts *facts)
 		memcpy(tree.low, whole->low, sizeof tree.low);
 		tree.edge = whole->edge;
 		tree.is_one_sided = whole->is_one_sided;
+		tree.is_cloud = whole->is_cloud;
 		code = make_image(u, image, &part, &tree);
 	}
 	if (code == PSR_OK) {

@@ -130,5 +130,7 @@ int model_validate_octree(const struct octree *tree, struct psr_pool *pool, cons
 	for (uint64_t i = 0; tree->offset != NULL && i < tree->n_leaves; i += STRETCH)
 		if ((any_offset(tree, i) & ~(OCTREE_OFFSETS - 1)) != 0)
 			return fail_offset(tree, i, name, err);
+	if (tree->material != NULL && tree->one_material != NULL)
+		return fail("OMT1", "it has one material of all leaves, and section OMAT one of each");
 	return check_scan(&tree->scan, name, err);
 }

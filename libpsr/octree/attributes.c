@@ -8,6 +8,7 @@
 #define UNIT 32767
 #define STEP 14188   /* of offsets, in UNITs of a leaf's edge: sqrt(3) / OCTREE_OFFSETS */
 #define BINS 24      /* of foretold offsets */
+#define PARTS 4      /* of a material: what is metal, reflectance, shut, roughness */
 
 _Static_assert(OCTREE_OFFSETS == 4, "two bits an offset");
 
@@ -22,6 +23,8 @@ struct odds {
 	uint16_t normal[DEPTHS][SPREADS][COUNTS][2][8];
 	uint16_t offset[BINS][COUNTS][4];
 	uint16_t color[3][8][256];
+	uint16_t same_material[COUNTS][2][2];
+	uint16_t material[PARTS][8][256];
 };
 
 struct job {
@@ -248,6 +251,67 @@ static void code_color(struct job *job, uint32_t leaf)
 	}
 }
 
+/* ---- materials ---- */
+
+static uint32_t get_material(const struct job *job, uint32_t leaf)
+{
+	const uint8_t *at = job->attributes.material[leaf];
+
+	return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+}
+
+/* Codes each part by how far it is from the mean of the neighbours', round its end. */
+static uint32_t code_parts(struct job *job, uint32_t material, uint32_t before)
+{
+	static const struct {
+		int at, n_bits;
+	} parts[PARTS] = { { 0, 5 }, { 5, 5 }, { 10, 6 }, { 16, 8 } };
+	uint32_t coded = 0;
+
+	for (int k = 0; k < PARTS; k++) {
+		const uint32_t most = (1u << parts[k].n_bits) - 1, middle = most / 2 + 1;
+		uint32_t sum = 0, low = most, high = 0, from = before >> parts[k].at & most, step;
+
+		for (unsigned i = 0; i < job->n; i++) {
+			const uint32_t value = get_material(job, job->near[i].at) >> parts[k].at & most;
+
+			sum += (uint32_t)job->near[i].weight * value;
+			low = value < low ? value : low;
+			high = value > high ? value : high;
+		}
+		if (job->n > 0)
+			from = (sum + (uint32_t)job->weight / 2) / (uint32_t)job->weight;
+		const int spread = job->n < 2 ? 7 : log2_floor(high - low + 1);
+		step = ((material >> parts[k].at) - from + middle) & most;
+		step = code_bits(job, job->odds->material[k][spread < 8 ? spread : 7], parts[k].n_bits, step);
+		coded |= ((step + from - middle) & most) << parts[k].at;
+	}
+	return coded;
+}
+
+/* Most parts of things have one material: that of the nearest leaf is tried first. */
+static void code_material(struct job *job, uint32_t leaf)
+{
+	uint32_t before = leaf > 0 ? get_material(job, leaf - 1) : 0;
+	uint32_t material = job->is_decoding ? 0 : get_material(job, leaf);
+	int nearest = 0, is_agreed = 1;
+	uint16_t *p;
+
+	for (unsigned i = 0; i < job->n; i++)
+		if (job->near[i].weight > nearest) {
+			nearest = job->near[i].weight;
+			before = get_material(job, job->near[i].at);
+		}
+	for (unsigned i = 0; i < job->n; i++)
+		is_agreed &= get_material(job, job->near[i].at) == before;
+	p = &job->odds->same_material[count_of(job)][job->was_same][is_agreed];
+	job->was_same = (int)coder_adaptive(job->coder, job->is_decoding, p, 5, material == before);
+	material = job->was_same ? before : code_parts(job, material, before);
+	if (job->is_decoding)
+		for (int i = 0; i < 3; i++)
+			job->attributes.material[leaf][i] = (uint8_t)(material >> 8 * i);
+}
+
 /* ---- all ---- */
 
 static void visit_normal(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
@@ -273,12 +337,20 @@ static void visit_color(uint32_t leaf, uint64_t path, const struct octree_near *
 	code_color(userdata, leaf);
 }
 
+static void visit_material(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
+{
+	(void)path;
+	find_near(userdata, leaf, near);
+	code_material(userdata, leaf);
+}
+
 static int code_stream(struct job *job, const struct octree_levels *levels, enum octree_stream stream)
 {
 	static void (*const visits[OCTREE_STREAMS])(uint32_t, uint64_t, const struct octree_near *, void *) = {
 		[OCTREE_NORMAL_STREAM] = visit_normal,
 		[OCTREE_OFFSET_STREAM] = visit_offset,
 		[OCTREE_COLOR_STREAM] = visit_color,
+		[OCTREE_MATERIAL_STREAM] = visit_material,
 	};
 
 	job->unit = psr_direction_words();

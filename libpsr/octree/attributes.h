@@ -1,5 +1,5 @@
-/* What leaves have beside their places, packed: a stream each for normals, offsets and colours. Every value is foretold
- * from the leaves around it that come earlier, so a decoder needs the codes of all levels first. */
+/* What leaves have beside their places, packed: a stream each for normals, offsets, colours and materials. Every value
+ * is foretold from the leaves around it that come earlier, so a decoder needs the codes of all levels first. */
 #ifndef PSR_OCTREE_ATTRIBUTES_H
 #define PSR_OCTREE_ATTRIBUTES_H
 
@@ -11,12 +11,14 @@ struct octree_attributes {
 	uint16_t *normal;
 	uint8_t *offset;
 	uint8_t (*color)[3];
+	uint8_t (*material)[3];
 };
 
 enum octree_stream {
 	OCTREE_NORMAL_STREAM,
 	OCTREE_OFFSET_STREAM, /* by the normals, if there are any: these are unpacked first */
 	OCTREE_COLOR_STREAM,
+	OCTREE_MATERIAL_STREAM,
 	OCTREE_STREAMS
 };
 

@@ -1,4 +1,5 @@
 #include <assert.h>
+#include <math.h>
 #include "octree.h"
 #include "base/direction.h"
 
@@ -48,6 +49,77 @@ void octree_mean_color(uint8_t mean[3], const uint8_t (*color)[3], unsigned n)
 			sum[c] += color[i][c];
 	for (int c = 0; c < 3; c++)
 		mean[c] = (uint8_t)(sum[c] * part[n] >> 16);
+}
+
+/* Returns the length of the mean of unit normals. */
+static double mean_length(const uint16_t *normal, unsigned n)
+{
+	const float(*direction)[3] = psr_direction_table();
+	double sum[3] = { 0.0, 0.0, 0.0 }, most = 0.0;
+	unsigned differ = 0;
+
+	for (unsigned i = 1; i < n; i++)
+		differ |= (unsigned)(normal[i] ^ normal[0]);
+	if (differ == 0)
+		return 1.0;
+	for (unsigned i = 0; i < n; i++) {
+		const float *d = direction[normal[i]];
+
+		for (int c = 0; c < 3; c++)
+			sum[c] += (double)d[c];
+		most += sqrt((double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2]);
+	}
+	return sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) / most;
+}
+
+#define METAL 31       /* steps of what a material has of metal, */
+#define REFLECTANCE 30 /* of the root of the reflectance of all else, */
+#define ROUGH 255      /* of roughness */
+
+struct material_sums {
+	unsigned metallic, shut, rest, reflected; /* rest: not metal; reflected: steps of reflectance, squared, of that */
+	double mirrored, width2, plain_width2;
+};
+
+static void add_material(struct material_sums *sums, uint32_t material)
+{
+	const unsigned metallic = material & METAL, rest = METAL - metallic, code = material >> 5 & 31;
+	const unsigned root = code < REFLECTANCE ? code : REFLECTANCE, reflected = rest * root * root;
+	const double roughness = (material >> 16) * (1.0 / ROUGH), width2 = roughness * roughness * (roughness * roughness);
+	const double mirrored = metallic * (REFLECTANCE * REFLECTANCE) + reflected;
+
+	sums->metallic += metallic;
+	sums->shut += material >> 10 & 63;
+	sums->rest += rest;
+	sums->reflected += reflected;
+	sums->mirrored += mirrored;
+	sums->width2 += mirrored * width2;
+	sums->plain_width2 += width2;
+}
+
+uint32_t octree_mean_material(const struct octree *tree, uint64_t first, unsigned n)
+{
+	const uint32_t one = octree_material(tree, first);
+	struct material_sums sums = { 0 };
+	uint32_t differ = 0;
+	double length;
+
+	for (unsigned i = 0; i < n; i++) {
+		const uint32_t material = octree_material(tree, first + i);
+
+		differ |= material ^ one;
+		add_material(&sums, material);
+	}
+	length = tree->normal != NULL && sums.mirrored > 0.0 ? mean_length(tree->normal + first, n) : 1.0;
+	if (differ == 0 && !(length < 1.0))
+		return one;
+	double width2 = sums.mirrored > 0.0 ? sums.width2 / sums.mirrored : sums.plain_width2 / n;
+	if (length < 1.0)
+		width2 += 2.0 * (1.0 - length) / length; /* NaN and infinity: 1 */
+	const double roughness = width2 < 1.0 ? sqrt(sqrt(width2)) : 1.0;
+	const double root = sums.rest > 0 ? sqrt((double)sums.reflected / sums.rest) : (double)(one >> 5 & 31);
+	return (sums.metallic + n / 2) / n | (uint32_t)(root + 0.5) << 5 | (sums.shut + n / 2) / n << 10
+	       | (uint32_t)(roughness * ROUGH + 0.5) << 16;
 }
 
 unsigned octree_mean_offset(unsigned code, uint16_t mean, const uint16_t *normal, const uint8_t *offset)

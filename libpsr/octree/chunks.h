@@ -28,7 +28,8 @@ static inline struct octree_attributes chunk_attributes(const struct chunk_step 
 {
 	return (struct octree_attributes){ tree->normal != NULL ? tree->normal + step->leaf : NULL,
 		                               tree->offset != NULL ? tree->offset + step->leaf : NULL,
-		                               tree->color != NULL ? tree->color + step->leaf : NULL };
+		                               tree->color != NULL ? tree->color + step->leaf : NULL,
+		                               tree->material != NULL ? tree->material + step->leaf : NULL };
 }
 
 /* Returns the chunk's levels down to a depth, whose nodes are then leaves. The arrays stay the chunk's. */
@@ -45,7 +46,8 @@ static inline unsigned chunk_streams(const struct octree *tree)
 {
 	return (unsigned)(tree->normal != NULL) << OCTREE_NORMAL_STREAM
 	       | (unsigned)(tree->offset != NULL) << OCTREE_OFFSET_STREAM
-	       | (unsigned)(tree->color != NULL) << OCTREE_COLOR_STREAM;
+	       | (unsigned)(tree->color != NULL) << OCTREE_COLOR_STREAM
+	       | (unsigned)(tree->material != NULL) << OCTREE_MATERIAL_STREAM;
 }
 
 /* Returns whether a tree of these streams may be packed in steps: offsets along no normals have no means. */

@@ -25,6 +25,8 @@ static int put_means(const struct octree_node *node, void *userdata)
 		tree->normal[leaf] = octree_mean_normal(finer->normal + node->leaf, n);
 	if (tree->color != NULL)
 		octree_mean_color(tree->color[leaf], (const uint8_t(*)[3])finer->color + node->leaf, n);
+	if (tree->material != NULL)
+		octree_put_material(tree->material[leaf], octree_mean_material(finer, node->leaf, n));
 	if (tree->offset != NULL)
 		tree->offset[leaf] = (uint8_t)octree_mean_offset(code, tree->normal[leaf], finer->normal + node->leaf,
 		                                                 finer->offset + node->leaf);
@@ -41,6 +43,13 @@ static int make_attributes(struct octree *tree, const struct octree *finer)
 		return 0;
 	if (finer->normal != NULL && finer->offset != NULL && (tree->offset = malloc(tree->n_leaves)) == NULL)
 		return 0;
+	if (finer->material != NULL && (tree->material = malloc(tree->n_leaves * sizeof *tree->material)) == NULL)
+		return 0;
+	if (finer->one_material != NULL) {
+		if ((tree->one_material = malloc(sizeof *tree->one_material)) == NULL)
+			return 0;
+		memcpy(tree->one_material, finer->one_material, sizeof *tree->one_material);
+	}
 	octree_walk(finer, tree->levels, put_means, &averaging);
 	return 1;
 }

@@ -12,6 +12,8 @@ void octree_destroy(struct octree *tree)
 	free(tree->normal);
 	free(tree->color);
 	free(tree->offset);
+	free(tree->material);
+	free(tree->one_material);
 	free(tree->scan.intensity);
 	free(tree->scan.class);
 	free(tree->scan.returns);

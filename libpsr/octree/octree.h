@@ -13,6 +13,7 @@
 #define OCTREE_MOST_LEVELS 20
 #define OCTREE_SKIP_LEVELS 6 /* from a node of the skip index to its leaves: some 4,000 leaves of a surface */
 #define OCTREE_OFFSETS 4     /* steps of a leaf's offset */
+#define OCTREE_MATTE 0xff0000u /* the material of leaves that have none: rough, open, mirrors nothing */
 
 /* Where the subtree of a node OCTREE_SKIP_LEVELS above the leaves begins; the root's in a tree of fewer levels. */
 struct octree_skip {
@@ -41,6 +42,8 @@ struct octree {
 	uint16_t *normal;          /* of each leaf in Morton order: base/direction.h; NULL: none */
 	uint8_t (*color)[3];       /* sRGB; NULL: none */
 	uint8_t *offset;           /* [B] 5.1: 0..OCTREE_OFFSETS - 1, octree_offset(); NULL: none */
+	uint8_t (*material)[3];    /* of each leaf: bits 40 to 63 of a sample's attributes (model/blocks.h), lowest byte first */
+	uint8_t (*one_material)[3]; /* of all leaves, where that is NULL; both NULL: OCTREE_MATTE */
 	struct octree_scan scan;
 };
 
@@ -101,9 +104,29 @@ void octree_mean_color(uint8_t mean[3], const uint8_t (*color)[3], unsigned n); 
  * code: the node's, which lists its children. */
 unsigned octree_mean_offset(unsigned code, uint16_t mean, const uint16_t *normal, const uint8_t *offset);
 
+/* Returns a leaf's material, bits 40 to 63 of a sample's attributes. */
+static inline uint32_t octree_material(const struct octree *tree, uint64_t leaf)
+{
+	const uint8_t *one = tree->one_material != NULL ? *tree->one_material : NULL;
+	const uint8_t *at = tree->material != NULL ? tree->material[leaf] : one;
+
+	return at != NULL ? at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 : OCTREE_MATTE;
+}
+
+static inline void octree_put_material(uint8_t at[3], uint32_t material)
+{
+	for (int i = 0; i < 3; i++)
+		at[i] = (uint8_t)(material >> 8 * i);
+}
+
+/* Returns the mean of the materials of n leaves from `first` on: of metal and of openness; of reflectances, by what is
+ * not metal; and the root of the mean of lobes' squared widths, by F0, where metal counts as white. A lobe that mirrors
+ * is widened by the spread of the leaves' normals ([Toksvig]), as those of blocks are (surface/blend.h). */
+uint32_t octree_mean_material(const struct octree *tree, uint64_t first, unsigned n);
+
 /* Makes the tree whose leaves are the nodes right above those of `finer`, of more than OCTREE_LEAST_LEVELS levels: with
- * the means of their normals and colours, and, where leaves have normals and offsets, the offsets of their mean places.
- * NULL without memory. */
+ * the means of their normals, colours and materials, and, where leaves have normals and offsets, the offsets of their
+ * mean places. One material of all stays it. NULL without memory. */
 struct octree *octree_coarser(const struct octree *finer);
 
 /* ---- paths ---- */

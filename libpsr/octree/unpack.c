@@ -126,6 +126,8 @@ static int alloc_tree(struct unpacking *u)
 		tree->offset = malloc(u->n_leaves);
 	if (u->streams >> OCTREE_COLOR_STREAM & 1)
 		tree->color = malloc(u->n_leaves * sizeof *tree->color);
+	if (u->streams >> OCTREE_MATERIAL_STREAM & 1)
+		tree->material = malloc(u->n_leaves * sizeof *tree->material);
 	return tree->code != NULL && tree->skip != NULL && chunk_streams(tree) == u->streams ? PSR_OK : PSR_ERR_MEMORY;
 }
 

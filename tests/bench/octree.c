@@ -173,10 +173,10 @@ static int collect_code(const struct octree_node *node, void *userdata)
 /* Normals as they are, of 15 bits, and all else that the leaves have; as one chunk. */
 static int print_attributes(const struct octree *tree, struct psr_error *err)
 {
-	static const char *const names[] = { "normals", "offsets", "colours" };
+	static const char *const names[] = { "normals", "offsets", "colours", "material" };
 	static const uint64_t root = 0;
-	const struct octree_attributes leaf = { tree->normal, tree->offset, tree->color };
-	const void *const array[] = { tree->normal, tree->offset, tree->color };
+	const struct octree_attributes leaf = { tree->normal, tree->offset, tree->color, tree->material };
+	const void *const array[] = { tree->normal, tree->offset, tree->color, tree->material };
 	struct octree_levels levels = { .height = tree->levels, .n_roots = 1, .root = &root };
 	struct collecting c = { .tree = tree };
 	int rc = PSR_OK;

@@ -159,7 +159,8 @@ for y in range(200):
             assert max(color) <= 8, ("outside", x, y)
 END
 # A leaf is a 128th of the teapot, so outlines may differ by a pixel or two of 100: in 4 % of the pixels at most by all of
-# the 150 codes between the teapot and what is behind it; inside colours differ by gloss, which octrees have not.
+# the 150 codes between the teapot and what is behind it. Its highlights, brighter than all else, are where those of the
+# blocks are, but for a pixel around each.
 shot --instance teapot,as=blocks -o "$work/blocks.ppm" 2>/dev/null
 shot --instance teapot,as=octree -o "$work/octree.ppm" 2>/dev/null
 check "a mesh's octree looks like its blocks" python3 - "$work/blocks.ppm" "$work/octree.ppm" <<'END'
@@ -167,6 +168,9 @@ import sys
 a, b = (open(path, "rb").read()[-200 * 200 * 3:] for path in sys.argv[1:])
 far = sum(max(abs(a[i + c] - b[i + c]) for c in range(3)) > 48 for i in range(0, len(a), 3))
 assert far < 0.04 * 200 * 200, far
+bright = [i for i in range(0, len(a), 3) if a[i] > 90]
+both = sum(b[i] > 80 for i in bright)
+assert len(bright) > 20 and 2 * both > len(bright), (both, len(bright))
 END
 check "a flat cloud is seen from both sides" python3 - "$(hashes --model square --view front)" "$(hashes --model square --view back)" <<'END'
 import sys

@@ -19,7 +19,7 @@ static void check_octree(const struct octree *tree)
 	uint64_t n_leaves = 0;
 
 	octree_walk(tree, tree->levels, take_leaf, &n_leaves);
-	REQUIRE(n_leaves == tree->n_leaves);
+	REQUIRE(n_leaves == tree->n_leaves && (tree->material == NULL || tree->one_material == NULL));
 	for (uint64_t i = 0; i < n_leaves; i++)
 		REQUIRE((tree->normal == NULL || tree->normal[i] < 32768) &&
 		        (tree->offset == NULL || tree->offset[i] < OCTREE_OFFSETS));

@@ -49,6 +49,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 		REQUIRE(tree->normal == NULL || memcmp(again->normal, tree->normal, 2 * tree->n_leaves) == 0);
 		REQUIRE(tree->offset == NULL || memcmp(again->offset, tree->offset, tree->n_leaves) == 0);
 		REQUIRE(tree->color == NULL || memcmp(again->color, tree->color, 3 * tree->n_leaves) == 0);
+		REQUIRE(!again->material == !tree->material);
+		REQUIRE(tree->material == NULL || memcmp(again->material, tree->material, 3 * tree->n_leaves) == 0);
 		octree_destroy(again);
 		check_beginnings(bytes, n_bytes);
 		free(bytes);

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include "of_mesh.h"
 #include "octree/build/voxels.h"
+#include "surface/material.h"
 #include "surface/surface.h"
 #include "surface/texture.h"
 #include "base/array.h"
@@ -22,7 +23,8 @@ struct facet {
 	uint32_t triangle;
 	double corner[3][3]; /* of the whole triangle, in leaves from the leaf's low corner */
 	double area, middle[3];
-	float normal[3], color[3]; /* linear */
+	float normal[3];
+	struct look look;
 };
 
 struct leaf_maker {
@@ -89,10 +91,11 @@ static void look_at(const struct leaf_maker *m, struct facet *facet)
 
 	find_place(&place, facet, facet->middle);
 	word = surface_look(&m->look, &place, DIAGONAL, facet->normal);
-	for (int c = 0; c < 3; c++) {
+	material_decode(&facet->look, word);
+	if (facet->look.unlit)
+		facet->look.roughness = 1; /* leaves are lit */
+	for (int c = 0; c < 3; c++)
 		facet->normal[c] = m->is_turned[facet->triangle] ? -facet->normal[c] : facet->normal[c];
-		facet->color[c] = psr_srgb_to_linear[PSR_ATTR_BASE(word) >> 8 * c & 255];
-	}
 }
 
 /* Returns 0 without memory. */
@@ -153,10 +156,47 @@ static int is_on_side(const struct facet *facet, const float side[3])
 	return v3f_dot(facet->normal, side) > ASIDE;
 }
 
-/* Sums up the facets on the side of the greatest one; returns their area. */
-static double add_facets(struct leaf_maker *m, const float side[3], double normal[3], double color[3], double middle[3])
+/* Of the facets of a side, times their areas. The lobes' squared widths are added by what they mirror. */
+struct facet_sums {
+	double area, normal[3], color[3], middle[3];
+	double metallic, open, rest, reflected, mirrored, width2, plain_width2;
+};
+
+static void add_look(struct facet_sums *sums, const struct look *look, double area)
 {
-	double area = 0.0;
+	const double metallic = (double)look->metallic, rest = 1.0 - metallic, reflected = rest * (double)look->reflectance;
+	const double width = (double)look->roughness * (double)look->roughness;
+	double mirrored = 3.0 * reflected;
+
+	for (int c = 0; c < 3; c++) {
+		sums->color[c] += area * (double)look->base[c];
+		mirrored += metallic * (double)look->base[c];
+	}
+	sums->metallic += area * metallic;
+	sums->open += area * (double)look->open;
+	sums->rest += area * rest;
+	sums->reflected += area * reflected;
+	sums->mirrored += area * mirrored;
+	sums->width2 += area * mirrored * width * width;
+	sums->plain_width2 += area * width * width;
+}
+
+/* A place within a leaf of one look has that look's lobe, whatever the normals are around: as samples of blocks do. */
+static uint32_t material_of(const struct facet_sums *sums)
+{
+	const double width2 = sums->mirrored > 0.0 ? sums->width2 / sums->mirrored : sums->plain_width2 / sums->area;
+	const struct look look = { .metallic = (float)(sums->metallic / sums->area),
+		                       .open = (float)(sums->open / sums->area),
+		                       .reflectance = sums->rest > 0.0 ? (float)(sums->reflected / sums->rest)
+		                                                       : (float)MATERIAL_DIELECTRIC,
+		                       .roughness = (float)sqrt(sqrt(width2)) };
+
+	return (uint32_t)(material_encode(&look) >> 40);
+}
+
+/* Sums up the facets on the side of the greatest one. */
+static void add_facets(struct leaf_maker *m, const float side[3], struct facet_sums *sums)
+{
 	int is_both = 0;
 
 	for (size_t i = 0; i < m->n_facets; i++) {
@@ -165,15 +205,14 @@ static double add_facets(struct leaf_maker *m, const float side[3], double norma
 		is_both |= v3f_dot(f->normal, side) < OPPOSITE;
 		if (!is_on_side(f, side))
 			continue;
-		area += f->area;
+		sums->area += f->area;
+		add_look(sums, &f->look, f->area);
 		for (int c = 0; c < 3; c++) {
-			normal[c] += f->area * (double)f->normal[c];
-			color[c] += f->area * (double)f->color[c];
-			middle[c] += f->area * f->middle[c];
+			sums->normal[c] += f->area * (double)f->normal[c];
+			sums->middle[c] += f->area * f->middle[c];
 		}
 	}
 	m->report.n_both += (uint64_t)is_both;
-	return area;
 }
 
 static double find_offset(const struct leaf_maker *m, const float side[3], const float normal[3], const double middle[3])
@@ -197,27 +236,28 @@ static void set_leaf(struct leaf_maker *m, uint64_t leaf)
 {
 	struct octree *tree = m->maker.tree;
 	const struct facet *greatest = m->facet;
-	double normal[3] = { 0 }, color[3] = { 0 }, middle[3] = { 0 }, area;
+	struct facet_sums sums = { 0 };
 	float mean[3];
 
 	for (size_t i = 1; i < m->n_facets; i++)
 		greatest = m->facet[i].area > greatest->area ? &m->facet[i] : greatest;
-	area = add_facets(m, greatest->normal, normal, color, middle);
+	add_facets(m, greatest->normal, &sums);
 	for (int c = 0; c < 3; c++) {
-		mean[c] = (float)(normal[c] / area);
-		middle[c] /= area;
-		tree->color[leaf][c] = psr_linear_to_srgb((float)(color[c] / area));
+		mean[c] = (float)(sums.normal[c] / sums.area);
+		sums.middle[c] /= sums.area;
+		tree->color[leaf][c] = psr_linear_to_srgb((float)(sums.color[c] / sums.area));
 	}
+	octree_put_material(tree->material[leaf], material_of(&sums));
 	tree->normal[leaf] = psr_direction_encode(mean);
 	tree->offset[leaf] = (uint8_t)octree_offset_step(
-		find_offset(m, greatest->normal, psr_direction_table()[tree->normal[leaf]], middle));
+		find_offset(m, greatest->normal, psr_direction_table()[tree->normal[leaf]], sums.middle));
 }
 
 static int leaf_room(struct leaf_maker *m, uint64_t leaf)
 {
 	struct octree *tree = m->maker.tree;
 	const uint64_t more = leaf + leaf / 4 + 4096;
-	void *normal, *color, *offset;
+	void *normal, *color, *offset, *material;
 
 	if (leaf < m->room)
 		return 1;
@@ -227,7 +267,9 @@ static int leaf_room(struct leaf_maker *m, uint64_t leaf)
 		tree->color = color;
 	if ((offset = realloc(tree->offset, more)) != NULL)
 		tree->offset = offset;
-	if (normal == NULL || color == NULL || offset == NULL)
+	if ((material = realloc(tree->material, more * sizeof *tree->material)) != NULL)
+		tree->material = material;
+	if (normal == NULL || color == NULL || offset == NULL || material == NULL)
 		return 0;
 	m->room = more;
 	return 1;
@@ -276,6 +318,24 @@ static void find_cube(struct octree_surface *surface, const struct psr_mesh *mes
 		surface->edge = fmax(surface->edge, high[c] - surface->low[c]);
 }
 
+/* Leaves of one material have it once; of that of leaves without any, none. */
+static void join_materials(struct octree *tree)
+{
+	const uint32_t first = octree_material(tree, 0);
+
+	for (uint64_t i = 1; i < tree->n_leaves; i++)
+		if (octree_material(tree, i) != first)
+			return;
+	if (first == OCTREE_MATTE) {
+		free(tree->material);
+	} else {
+		void *one = realloc(tree->material, sizeof *tree->one_material);
+
+		tree->one_material = one != NULL ? one : tree->material;
+	}
+	tree->material = NULL;
+}
+
 static int build(struct leaf_maker *m)
 {
 	const struct octree_room room = { m->options->memory, m->options->folder };
@@ -291,6 +351,8 @@ static int build(struct leaf_maker *m)
 		rc = octree_surface_walk(&m->surface, m->levels, &room, make_leaf, m, m->err);
 	if (rc == PSR_OK && m->maker.tree->n_leaves == 0)
 		rc = psr_fail(m->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", m->mesh->n_triangles);
+	if (rc == PSR_OK)
+		join_materials(m->maker.tree);
 	return rc;
 }
 

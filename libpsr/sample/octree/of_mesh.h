@@ -1,4 +1,5 @@
-/* Octrees of meshes: the leaves that a surface meets, with its normals, filtered colours and offsets ([B] 5.1). */
+/* Octrees of meshes: the leaves that a surface meets, with its normals, filtered colours, materials and offsets ([B]
+ * 5.1). */
 #ifndef PSR_SAMPLE_OCTREE_OF_MESH_H
 #define PSR_SAMPLE_OCTREE_OF_MESH_H
 
@@ -11,7 +12,8 @@ struct octree_mesh_report {
 	int is_closed;   /* the surface has no rim: with n_both 0 nobody outside sees a leaf from its back */
 };
 
-/* Builds a tree with normals, offsets and colours. A leaf's normal and colour are means over the surface within the
+/* Builds a tree with normals, offsets, colours and materials: one of all leaves, if they are the same. A leaf's normal,
+ * colour and material are means over the surface within the
  * leaf, weighted by area; textures are filtered over a circle of its diagonal. The offset is where the line through
  * the leaf's middle along the normal meets the surface, as near to the middle as it does; where it misses, where the
  * middle of the surface within the leaf lies along it. Transparent places have no leaves, nor have cells that a surface

@@ -65,6 +65,8 @@ static void find_leaves(struct strip_pixels *p, const struct warp_instance *in, 
 			__builtin_prefetch(tree[i]->normal + leaf[i]);
 		if (tree[i]->color != NULL)
 			__builtin_prefetch(tree[i]->color + leaf[i]);
+		if (tree[i]->material != NULL)
+			__builtin_prefetch(tree[i]->material + leaf[i]);
 	}
 	for (uint32_t i = first; i < end; i++) {
 		p->leaf[i] = psr_cubes_attr(tree[i], leaf[i]);

@@ -40,7 +40,7 @@ static int setup(void **state)
 	(void)state;
 	free(leaves.path);
 	fixture_init(&fixture, 1);
-	assert_true(tree != NULL && leaves_dress(tree, 7));
+	assert_true(tree != NULL && leaves_dress(tree, 15));
 	assert_int_equal(psr_model_create_octree(&octree, &fixture.info, tree, &fixture.presets, NULL), PSR_OK);
 	assert_int_equal(psr_model_create(&blocks, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
 	octree_destroy(tree);

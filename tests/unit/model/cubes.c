@@ -18,9 +18,9 @@
 static const struct {
 	int levels;
 	size_t n; /* leaves at random; 0: a sphere */
-	int is_one_sided, has_attributes;
+	int is_one_sided, has_attributes; /* 2: one material of all leaves */
 } forms[] = { { 2, 5, 1, 1 },     { 3, 9, 0, 1 }, { 5, 0, 1, 1 }, { 6, 0, 1, 1 }, { 7, 0, 0, 1 },
-	          { 8, 0, 1, 1 },     { 7, 0, 0, 0 }, { 9, 1, 1, 1 }, { 12, 5000, 0, 1 }, { 20, 2000, 1, 1 } };
+	          { 8, 0, 1, 2 },     { 7, 0, 0, 0 }, { 9, 1, 1, 1 }, { 12, 5000, 0, 1 }, { 20, 2000, 1, 1 } };
 #define N_FORMS (sizeof forms / sizeof *forms)
 
 static struct octree *make_tree(size_t form)
@@ -45,7 +45,10 @@ static struct octree *make_tree(size_t form)
 	tree->scan.class = malloc(tree->n_leaves);
 	tree->scan.returns = malloc(tree->n_leaves);
 	assert_true(tree->scan.intensity != NULL && tree->scan.class != NULL && tree->scan.returns != NULL);
+	tree->material = malloc(tree->n_leaves * sizeof *tree->material);
+	assert_non_null(tree->material);
 	for (uint64_t i = 0; i < tree->n_leaves; i++) {
+		octree_put_material(tree->material[i], (uint32_t)random_below(&random, 1 << 24));
 		tree->scan.intensity[i] = (uint16_t)random_below(&random, 65536);
 		tree->scan.class[i] = (uint8_t)random_below(&random, 256);
 		tree->scan.returns[i] = (uint8_t)random_below(&random, 256);
@@ -55,6 +58,10 @@ static struct octree *make_tree(size_t form)
 		tree->offset[i] = (uint8_t)random_below(&random, OCTREE_OFFSETS);
 		for (int c = 0; c < 3; c++)
 			tree->color[i][c] = (uint8_t)random_below(&random, 256);
+	}
+	if (forms[form].has_attributes == 2) {
+		tree->one_material = tree->material;
+		tree->material = NULL;
 	}
 	return tree;
 }
@@ -88,6 +95,7 @@ static int has_means(const struct octree_node *node, void *userdata)
 	assert_int_equal(c->tree->normal[c->n], normal);
 	octree_mean_color(color, (const uint8_t(*)[3])c->finer->color + node->leaf, n);
 	assert_memory_equal(c->tree->color[c->n], color, 3);
+	assert_int_equal(octree_material(c->tree, c->n), octree_mean_material(c->finer, node->leaf, n));
 	const struct octree_scan *scan = &c->finer->scan;
 	unsigned intensity = n / 2;
 	for (unsigned i = 0; i < n; i++)
@@ -129,6 +137,8 @@ static void assert_coarser(const struct octree *tree, const struct octree *finer
 	assert_int_equal(tree->normal != NULL, finer->normal != NULL);
 	assert_int_equal(tree->color != NULL, finer->color != NULL);
 	assert_int_equal(tree->offset != NULL, finer->offset != NULL);
+	assert_int_equal(tree->material != NULL, finer->normal != NULL);
+	assert_null(tree->one_material);
 	if (tree->normal != NULL)
 		octree_walk(finer, finer->levels - 1, has_means, &c);
 	octree_destroy(expected);
@@ -302,7 +312,7 @@ static void counts_tell_the_memory_of_cubes(void **state)
 		uint64_t guess;
 
 		assert_int_equal(psr_cubes_create(&cubes, tree, NULL, NULL), PSR_OK);
-		guess = psr_cubes_guess(tree, tree->normal != NULL ? 10 : 0);
+		guess = psr_cubes_guess(tree, tree->normal != NULL ? 13 : 0);
 		if (tree->n_leaves > 1000)
 			assert_true(guess > cubes->n_bytes * 7 / 8 && guess < cubes->n_bytes * 9 / 8);
 		psr_cubes_destroy(cubes);
@@ -332,7 +342,7 @@ static void the_scan_of_a_tree_is_surveyed(void **state)
 
 		assert_int_equal(psr_cubes_create(&cubes, tree, NULL, NULL), PSR_OK);
 		const struct psr_scan *scan = &cubes->scan;
-		assert_int_equal(scan->has_intensity, forms[form].has_attributes);
+		assert_int_equal(scan->has_intensity, forms[form].has_attributes != 0);
 		if (forms[form].has_attributes) {
 			const uint64_t n = tree->n_leaves, outside = n / 50;
 

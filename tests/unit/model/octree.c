@@ -34,6 +34,7 @@ static int setup(void **state)
 	tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
 	tree->offset = malloc(tree->n_leaves);
 	tree->color = malloc(tree->n_leaves * sizeof *tree->color);
+	tree->material = malloc(tree->n_leaves * sizeof *tree->material);
 	tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity);
 	tree->scan.class = malloc(tree->n_leaves);
 	tree->scan.returns = malloc(tree->n_leaves);
@@ -46,6 +47,7 @@ static int setup(void **state)
 		tree->offset[i] = (uint8_t)(fixture_random(&random) % OCTREE_OFFSETS);
 		for (int c = 0; c < 3; c++)
 			tree->color[i][c] = (uint8_t)fixture_random(&random);
+		octree_put_material(tree->material[i], (uint32_t)fixture_random(&random));
 		tree->scan.intensity[i] = (uint16_t)fixture_random(&random);
 		tree->scan.class[i] = (uint8_t)fixture_random(&random);
 		tree->scan.returns[i] = (uint8_t)fixture_random(&random);
@@ -79,6 +81,7 @@ static void assert_tree(const struct octree *t)
 	assert_memory_equal(t->normal, tree->normal, tree->n_leaves * sizeof *tree->normal);
 	assert_memory_equal(t->offset, tree->offset, tree->n_leaves);
 	assert_memory_equal(t->color, tree->color, tree->n_leaves * sizeof *tree->color);
+	assert_memory_equal(t->material, tree->material, tree->n_leaves * sizeof *tree->material);
 	assert_memory_equal(t->scan.intensity, tree->scan.intensity, tree->n_leaves * sizeof *tree->scan.intensity);
 	assert_memory_equal(t->scan.class, tree->scan.class, tree->n_leaves);
 	assert_memory_equal(t->scan.returns, tree->scan.returns, tree->n_leaves);
@@ -178,13 +181,58 @@ static void attributes_may_be_missing(void **state)
 	bare.normal = NULL;
 	bare.offset = NULL;
 	bare.color = NULL;
+	bare.material = NULL;
 	bare.scan = (struct octree_scan){ NULL };
 	assert_int_equal(psr_model_create_octree(&model, &fixture.info, &bare, NULL, NULL), PSR_OK);
 	assert_null(psr_model_octree(model)->normal);
 	assert_null(psr_model_octree(model)->offset);
 	assert_null(psr_model_octree(model)->color);
+	assert_null(psr_model_octree(model)->material);
+	assert_int_equal(octree_material(psr_model_octree(model), 7), OCTREE_MATTE);
 	assert_null(psr_model_octree(model)->scan.intensity);
 	psr_model_unref(model);
+}
+
+/* It takes a section of three bytes, in plain files and packed ones. */
+static void one_material_of_all_leaves_is_there_once(void **state)
+{
+	uint8_t material[1][3];
+	struct octree t = *tree;
+	struct psr_model *model = NULL, *bare = NULL, *again = NULL;
+	struct psr_error err = { 0 };
+	size_t n, n_bare;
+
+	(void)state;
+	octree_put_material(material[0], 0x1234bf);
+	t.material = NULL;
+	t.scan = (struct octree_scan){ NULL };
+	assert_int_equal(psr_model_create_octree(&bare, &fixture.info, &t, NULL, NULL), PSR_OK);
+	t.one_material = material;
+	assert_int_equal(psr_model_create_octree(&model, &fixture.info, &t, NULL, NULL), PSR_OK);
+	model_image(bare, &n_bare);
+	uint8_t *copy = copy_of(model, &n);
+	/* The hashes of chunks may take up what a longer table would. */
+	assert_in_range(n - n_bare, FILE_ALIGNMENT, 2 * FILE_ALIGNMENT);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), FILE_MINOR_MATERIAL);
+	for (uint64_t i = 0; i < t.n_leaves; i += 100)
+		assert_int_equal(octree_material(psr_model_octree(model), i), 0x1234bf);
+	/* Packed, and its beginnings, too. */
+	assert_int_equal(psr_model_write_packed(model, "/tmp/psr-one-material.psr", NULL), PSR_OK);
+	assert_int_equal(psr_model_read(&again, "/tmp/psr-one-material.psr", NULL), PSR_OK);
+	unlink("/tmp/psr-one-material.psr");
+	assert_int_equal(octree_material(psr_model_octree(again), 5), 0x1234bf);
+	psr_model_unref(again);
+	again = NULL;
+	/* A tree has one, or one of each. */
+	t.material = tree->material;
+	assert_int_equal(psr_model_create_octree(&again, &fixture.info, &t, NULL, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "section OMT1: it has one material of all leaves, and section OMAT one of each"));
+	memcpy(entry_of(copy, "OCTR"), "GONE", 4);
+	file_seal(copy, n);
+	assert_true(psr_model_parse(&again, copy, n, &err) != PSR_OK);
+	free(copy);
+	psr_model_unref(model);
+	psr_model_unref(bare);
 }
 
 static void what_is_no_octree_makes_no_model(void **state)
@@ -270,7 +318,8 @@ static void lies_in_sections_of_octrees_are_refused(void **state)
 
 static void a_set_of_sections_is_whole(void **state)
 {
-	static const char types[][5] = { "OCTR", "OSKP", "OCOD", "OTIM", "OTSC", "ONRM", "OOFF", "OCOL", "OINT", "OCLS", "ORET" };
+	static const char types[][5] = { "OCTR", "OSKP", "OCOD", "OTIM", "OTSC", "ONRM",
+		                             "OOFF", "OCOL", "OMAT", "OINT", "OCLS", "ORET" };
 
 	(void)state;
 	for (int i = 0; i < (int)(sizeof types / sizeof *types); i++)
@@ -307,7 +356,7 @@ static void sections_of_octrees_are_not_required(void **state)
 			assert_int_equal(file_get(entry + ENTRY_FLAGS, 2), 0);
 	}
 	assert_int_equal(file_get(copy + HEADER_MAJOR, 2), 6);
-	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 3);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 4);
 	free(copy);
 }
 
@@ -334,6 +383,7 @@ int main(void)
 		cmocka_unit_test(octrees_survive_file_map_and_packing),
 		cmocka_unit_test(threads_that_ask_for_cubes_get_the_same),
 		cmocka_unit_test(attributes_may_be_missing),
+		cmocka_unit_test(one_material_of_all_leaves_is_there_once),
 		cmocka_unit_test(what_is_no_octree_makes_no_model),
 		cmocka_unit_test(lies_in_sections_of_octrees_are_refused),
 		cmocka_unit_test(a_set_of_sections_is_whole),

@@ -47,8 +47,9 @@ static int setup(void **state)
 	(void)state;
 	free(leaves.path);
 	fixture_init(&fixture, 1);
-	assert_true(tree != NULL && leaves_dress(tree, 7));
+	assert_true(tree != NULL && leaves_dress(tree, 15));
 	tree->is_one_sided = 1;
+	tree->is_cloud = 1;
 	assert_int_equal(psr_model_create_octree(&models[0], &fixture.info, tree, &fixture.presets, NULL), PSR_OK);
 	assert_int_equal(psr_model_create_both(&models[1], &fixture.info, &fixture.blocks, tree, NULL, NULL), PSR_OK);
 	for (int i = 0; i < 2; i++) {
@@ -90,12 +91,14 @@ static void assert_tree(const struct octree *a, const struct octree *b)
 {
 	assert_int_equal(a->levels, b->levels);
 	assert_int_equal(a->is_one_sided, 1);
+	assert_int_equal(a->is_cloud, 1);
 	assert_int_equal(a->n_codes, b->n_codes);
 	assert_int_equal(a->n_leaves, b->n_leaves);
 	assert_memory_equal(a->code, b->code, a->n_codes);
 	assert_memory_equal(a->normal, b->normal, a->n_leaves * sizeof *a->normal);
 	assert_memory_equal(a->offset, b->offset, a->n_leaves);
 	assert_memory_equal(a->color, b->color, a->n_leaves * sizeof *a->color);
+	assert_memory_equal(a->material, b->material, a->n_leaves * sizeof *a->material);
 }
 
 /* Returns how many steps a file of n bytes has whole. */
@@ -314,7 +317,7 @@ static void lies_are_refused_even_under_right_hashes(void **state)
 		{ first, 8, 200, "goes from depth" },
 		{ first + 8, 8, step[0].n_codes + 1, "do not add up" },
 		{ first + 24, 8, 20, "is cut short" },
-		{ first + 24, 8, 10 * PACK_PIECE_BYTES, "up to byte" },
+		{ first + 24, 8, step[n_steps - 1].end, "up to byte" },
 		{ octree_at[0] + 8, 8, 0, "in 0 steps, is not known" },
 		{ octree_at[0] + 3, 1, 2, "of streams 0x2" },
 	};

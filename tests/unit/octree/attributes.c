@@ -30,9 +30,9 @@ static int put_node(const struct octree_node *node, void *userdata)
 
 static struct octree_attributes allocate(size_t n)
 {
-	struct octree_attributes a = { calloc(n, 2), calloc(n, 1), calloc(n, 3) };
+	struct octree_attributes a = { calloc(n, 2), calloc(n, 1), calloc(n, 3), calloc(n, 3) };
 
-	assert_true(a.normal != NULL && a.offset != NULL && a.color != NULL);
+	assert_true(a.normal != NULL && a.offset != NULL && a.color != NULL && a.material != NULL);
 	return a;
 }
 
@@ -41,6 +41,7 @@ static void release(struct octree_attributes *a)
 	free(a->normal);
 	free(a->offset);
 	free(a->color);
+	free(a->material);
 }
 
 static void set_up(struct fixture *f, struct leaves leaves, int levels)
@@ -69,8 +70,10 @@ static void set_anything(struct fixture *f)
 	for (size_t i = 0; i < f->n; i++) {
 		f->leaf.normal[i] = (uint16_t)random_below(&f->random, PSR_DIRECTIONS);
 		f->leaf.offset[i] = (uint8_t)random_below(&f->random, OCTREE_OFFSETS);
-		for (int c = 0; c < 3; c++)
+		for (int c = 0; c < 3; c++) {
 			f->leaf.color[i][c] = (uint8_t)random_below(&f->random, 256);
+			f->leaf.material[i][c] = (uint8_t)random_below(&f->random, 256);
+		}
 	}
 }
 
@@ -90,6 +93,9 @@ static int set_sphere_leaf(const struct octree_node *node, void *userdata)
 	for (int c = 0; c < 3; c++)
 		f->leaf.color[node->leaf][c] =
 			(uint8_t)(128 + (int)(100 * sin(9 * center[c])) + (int)random_below(&f->random, 5));
+	/* Two halves: rough, and a metal whose roughness goes up along y. */
+	octree_put_material(f->leaf.material[node->leaf],
+	                    center[0] < 0.5 ? 0xff00c0 : 31 | (uint32_t)(40 + 100 * center[1]) << 16);
 	return 0;
 }
 
@@ -135,6 +141,7 @@ static void assert_all_come_back(struct fixture *f, double bits[OCTREE_STREAMS])
 	assert_memory_equal(f->leaf.normal, f->again.normal, 2 * f->n);
 	assert_memory_equal(f->leaf.offset, f->again.offset, f->n);
 	assert_memory_equal(f->leaf.color, f->again.color, 3 * f->n);
+	assert_memory_equal(f->leaf.material, f->again.material, 3 * f->n);
 }
 
 static void anything_comes_back(void **state)
@@ -166,10 +173,13 @@ static void surfaces_pack_well(void **state)
 	set_up(&f, leaves_of_sphere(8), 8);
 	set_sphere(&f);
 	assert_all_come_back(&f, bits);
-	print_message("%zu leaves: normals %.2f bits, offsets %.2f, colours %.2f\n", f.n, bits[OCTREE_NORMAL_STREAM],
-	              bits[OCTREE_OFFSET_STREAM], bits[OCTREE_COLOR_STREAM]);
+	print_message("%zu leaves: normals %.2f bits, offsets %.2f, colours %.2f, materials %.2f\n", f.n,
+	              bits[OCTREE_NORMAL_STREAM], bits[OCTREE_OFFSET_STREAM], bits[OCTREE_COLOR_STREAM],
+	              bits[OCTREE_MATERIAL_STREAM]);
 	assert_true(bits[OCTREE_NORMAL_STREAM] < 6 && bits[OCTREE_OFFSET_STREAM] < 1.3);
 	assert_true(bits[OCTREE_COLOR_STREAM] < 12);
+	/* A step of roughness is 2.56 leaves: of neighbours in a row, one of two differs from the leaf before at most. */
+	assert_true(bits[OCTREE_MATERIAL_STREAM] < 2);
 	tear_down(&f);
 }
 

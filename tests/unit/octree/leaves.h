@@ -74,8 +74,8 @@ static inline struct octree *leaves_to_tree(const struct leaves *leaves, int lev
 	return tree;
 }
 
-/* Gives leaves attributes that are partly noise; streams: bit 0 normals, 1 offsets, 2 colours. Returns 0 without
- * memory. */
+/* Gives leaves attributes that are partly noise; streams: bit 0 normals, 1 offsets, 2 colours, 3 materials. Returns 0
+ * without memory. */
 static inline int leaves_dress(struct octree *tree, unsigned streams)
 {
 	const size_t n = tree->n_leaves;
@@ -87,6 +87,8 @@ static inline int leaves_dress(struct octree *tree, unsigned streams)
 		tree->offset = malloc(n);
 	if (streams & 4)
 		tree->color = malloc(n * sizeof *tree->color);
+	if (streams & 8)
+		tree->material = malloc(n * sizeof *tree->material);
 	for (size_t i = 0; i < n; i++) {
 		const uint64_t r = random_next(&random);
 
@@ -96,8 +98,11 @@ static inline int leaves_dress(struct octree *tree, unsigned streams)
 			tree->offset[i] = (uint8_t)(r >> 8 & 3);
 		for (int c = 0; c < 3 && tree->color != NULL; c++)
 			tree->color[i][c] = (uint8_t)(i / 256 + (r >> (16 + 4 * c) & 15));
+		if (tree->material != NULL) /* one for 512 leaves, but that one of eight is rougher */
+			octree_put_material(tree->material[i], (uint32_t)(i / 512 * 0x123456 ^ (r >> 32 & 7 ? 0 : r >> 24 & 0x70000)));
 	}
-	return !tree->normal == !(streams & 1) && !tree->offset == !(streams & 2) && !tree->color == !(streams & 4);
+	return !tree->normal == !(streams & 1) && !tree->offset == !(streams & 2) && !tree->color == !(streams & 4)
+	       && !tree->material == !(streams & 8);
 }
 
 /* After cmocka.h. */
@@ -110,12 +115,15 @@ static inline void assert_same(const struct octree *a, const struct octree *b)
 	assert_memory_equal(a->code, b->code, a->n_codes);
 	assert_memory_equal(a->skip, b->skip, a->n_skips * sizeof *a->skip);
 	assert_true(!a->normal == !b->normal && !a->offset == !b->offset && !a->color == !b->color);
+	assert_true(!a->material == !b->material);
 	if (a->normal != NULL)
 		assert_memory_equal(a->normal, b->normal, a->n_leaves * sizeof *a->normal);
 	if (a->offset != NULL)
 		assert_memory_equal(a->offset, b->offset, a->n_leaves);
 	if (a->color != NULL)
 		assert_memory_equal(a->color, b->color, a->n_leaves * sizeof *a->color);
+	if (a->material != NULL)
+		assert_memory_equal(a->material, b->material, a->n_leaves * sizeof *a->material);
 }
 
 #endif

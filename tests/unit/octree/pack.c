@@ -53,7 +53,7 @@ static void threads_pack_the_same_bytes_and_unpack_the_same_tree(void **state)
 
 	(void)state;
 	assert_true(tree->n_leaves > OCTREE_CHUNK);
-	assert_true(leaves_dress(tree, 7));
+	assert_true(leaves_dress(tree, 15));
 	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 	assert_int_equal(octree_pack(&bytes, &n, tree, OCTREE_FAST, NULL, NULL), PSR_OK);
 	assert_int_equal(octree_pack(&other, &n_other, tree, OCTREE_FAST, pool, NULL), PSR_OK);
@@ -63,7 +63,7 @@ static void threads_pack_the_same_bytes_and_unpack_the_same_tree(void **state)
 	                 PSR_OK);
 	assert_same(tree, again);
 	octree_packed_shares(&shares, bytes, n);
-	assert_int_equal(shares.codes + shares.stream[0] + shares.stream[1] + shares.stream[2], n);
+	assert_int_equal(shares.codes + shares.stream[0] + shares.stream[1] + shares.stream[2] + shares.stream[3], n);
 	/* Two bits of noise an offset; four a channel of colours. */
 	assert_in_range(shares.stream[OCTREE_OFFSET_STREAM], tree->n_leaves / 4, tree->n_leaves / 3);
 	assert_in_range(shares.stream[OCTREE_COLOR_STREAM], tree->n_leaves * 3 / 2, tree->n_leaves * 2);
@@ -121,7 +121,7 @@ static void what_is_cut_short_or_longer_is_refused(void **state)
 		uint8_t *bytes, *longer;
 		size_t n;
 
-		assert_true(leaves_dress(tree, packing == OCTREE_FAST ? 7 : 0));
+		assert_true(leaves_dress(tree, packing == OCTREE_FAST ? 15 : 0));
 		assert_int_equal(octree_pack(&bytes, &n, tree, packing, NULL, NULL), PSR_OK);
 		for (size_t shorter = 0; shorter < n; shorter += shorter < 64 || shorter + 8 > n ? 1 : 7)
 			assert_int_equal(unpack(bytes, shorter, UINT64_MAX), PSR_ERR_FORMAT);

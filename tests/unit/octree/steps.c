@@ -78,7 +78,7 @@ static void a_beginning_is_the_coarser_tree(void **state)
 {
 	(void)state;
 	for (enum octree_packing packing = OCTREE_FAST; packing <= OCTREE_SMALL; packing++)
-		for (unsigned streams = 0; streams < 8; streams++) {
+		for (unsigned streams = 0; streams < 16; streams++) {
 			struct packed p = make(streams & 1 ? 7 : 6, streams & 1 ? 9000 : 0, streams, packing);
 
 			/* Offsets along no normals have no means. */

@@ -11,6 +11,7 @@
 #include "base/vec.h"
 #include "meshes.h"
 #include "sample/octree/of_mesh.h"
+#include "surface/material.h"
 
 #define LEVELS 6
 #define SIDE (1 << LEVELS)
@@ -266,6 +267,59 @@ static void colors_of_vertices_are_those_of_the_middle(void **state)
 	meshes_free(mesh);
 }
 
+/* ---- materials ---- */
+
+static uint32_t material_of(const struct psr_material *material)
+{
+	struct material_values values;
+
+	material_values_default(&values, material);
+	return (uint32_t)(material_word(material, &values) >> 40);
+}
+
+static void leaves_have_the_material_of_their_surface(void **state)
+{
+	struct psr_mesh *mesh = meshes_square(2);
+	struct psr_material *two = calloc(2, sizeof *two);
+	uint32_t of[2];
+	struct octree *tree;
+
+	(void)state;
+	mesh->material->roughness = 0.3f;
+	mesh->material->metallic = 1;
+	tree = tree_of(mesh);
+	assert_null(tree->material);
+	assert_non_null(tree->one_material);
+	assert_int_equal(octree_material(tree, 9), material_of(mesh->material));
+	octree_destroy(tree);
+	/* Each triangle its own. Within a leaf that both meet all is between the two, as metal is by area. */
+	memcpy(two, mesh->material, sizeof *two);
+	two[1] = two[0];
+	two[1].metallic = 0;
+	two[1].roughness = 0.8f;
+	free(mesh->material);
+	mesh->material = two;
+	mesh->n_materials = 2;
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		mesh->triangle_material[t] = t % 2;
+	for (int i = 0; i < 2; i++)
+		of[i] = material_of(&two[i]);
+	tree = tree_of(mesh);
+	assert_null(tree->one_material);
+	uint64_t n[3] = { 0 };
+	for (uint64_t i = 0; i < tree->n_leaves; i++) {
+		const uint32_t material = octree_material(tree, i), rough = material >> 16;
+
+		n[material == of[0] ? 0 : material == of[1] ? 1 : 2]++;
+		assert_true(rough >= of[0] >> 16 && rough <= of[1] >> 16);
+		assert_true((material & 31) == (of[0] & 31) || (material >> 5 & 31) == (of[1] >> 5 & 31));
+	}
+	/* Diagonals of two squares a side of the mesh are in SIDE leaves each, or in twice as many. */
+	assert_true(n[0] > 0 && n[1] > 0 && n[2] <= 4 * SIDE);
+	octree_destroy(tree);
+	meshes_free(mesh);
+}
+
 /* Half of a texture is not there: its leaves neither, but for those about the border. */
 static void look_at_there(const struct point *p, void *userdata)
 {
@@ -408,6 +462,7 @@ int main(void)
 		cmocka_unit_test(textures_come_through),
 		cmocka_unit_test(textures_finer_than_leaves_are_filtered),
 		cmocka_unit_test(colors_of_vertices_are_those_of_the_middle),
+		cmocka_unit_test(leaves_have_the_material_of_their_surface),
 		cmocka_unit_test(transparent_places_have_no_leaves),
 		cmocka_unit_test(both_sides_of_a_thin_sheet_are_counted),
 		cmocka_unit_test(closed_parts_of_two_sides_are_turned_out),
