@@ -27,6 +27,8 @@ struct bins {
 	size_t is_quiet_capacity;
 	struct cull_hit *hit;    /* of each chunk together; chunks as they end, in any order */
 	size_t hit_capacity;
+	uint64_t *cubes;         /* in plans with runs, by hit: of cubes the ones that it draws, bit i: that of slot + i */
+	size_t cubes_capacity;
 	uint32_t *order;         /* one an entry, for the thread that draws its tile */
 	size_t order_capacity;
 	/* Of the cull alone. */

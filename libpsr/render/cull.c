@@ -14,14 +14,6 @@
 #define MOST_CHUNK 2048
 #define MANY_CHUNKS 64
 
-struct cull_chunk {
-	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits;
-	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
-	uint8_t flags, traits; /* of all hits, OR-ed */
-	uint64_t n_samples;
-	float place_error; /* greatest of its blocks, in pixels */
-};
-
 struct cull {
 	struct bins *bins;
 	const struct simd *simd;
@@ -29,14 +21,6 @@ struct cull {
 	uint32_t n_chunks, n_tiles;
 	uint32_t stride; /* of counts, by chunk: whole cache lines, so that threads share none */
 	atomic_uint n_hits; /* that chunks have appended */
-};
-
-/* A chunk whose blocks are being tested, and where its results go. */
-struct counting {
-	const struct cull *cull;
-	struct cull_chunk *chunk;
-	uint32_t *count;
-	struct cull_hit *hit;
 };
 
 /* What is drawn is half a pixel along both axes; the square of a veil two pixels apart or more; the disc of a splat. */
@@ -56,13 +40,13 @@ float cull_place_error(const struct plan *plan, const struct plan_instance *in, 
 }
 
 /* Takes the results of a batch, blocks first .. first + n - 1. */
-static void take_batch(struct counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
+static void take_batch(struct cull_counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
 {
 	struct cull_chunk *chunk = to->chunk;
 	struct cull_hit *hit = to->hit;
-	const struct plan *plan = to->cull->plan;
+	const struct plan *plan = to->plan;
 	const struct plan_instance *in = &plan->instance[chunk->instance];
-	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->cull->bins->masks[chunk->instance] : NULL;
+	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const int is_ewa = plan->with_ewa && in->cull.cubes != NULL; /* splats close gaps themselves */
 	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
@@ -88,9 +72,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		};
 		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats || is_ewa);
 		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
-		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
-			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
-				to->count[y * plan->tiles_x + x]++;
+		cull_count_tiles(to, hit);
 		chunk->levels |= 1u << hit->level;
 		chunk->n_mixed += hit->is_mixed;
 		chunk->n_clamped += (uint32_t)is_clamped;
@@ -105,26 +87,21 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 	to->hit = hit;
 }
 
-static void count_chunk(int i, void *userdata)
+static void count_blocks(struct cull_counting *to)
 {
-	struct cull *cull = userdata;
-	const struct plan *plan = cull->plan;
-	struct cull_chunk chunk = cull->bins->chunk[i];
-	const struct plan_instance *in = &plan->instance[chunk.instance];
-	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
-	struct cull_hit hit[MOST_CHUNK];
-	struct counting to = { cull, &chunk, count, hit };
-
-	memset(count, 0, cull->n_tiles * sizeof *count);
+	const struct plan *plan = to->plan;
+	struct cull_chunk *chunk = to->chunk;
+	const struct plan_instance *in = &plan->instance[chunk->instance];
 	const struct psr_blocks *b = in->cull.blocks;
-	const uint32_t chunk_end = chunk.first_block + chunk.n_blocks;
-	for (uint32_t k = chunk.first_cluster; k < b->n_clusters && b->cluster[k].first_block < chunk_end; k++) {
+	const uint32_t chunk_end = chunk->first_block + chunk->n_blocks;
+
+	for (uint32_t k = chunk->first_cluster; k < b->n_clusters && b->cluster[k].first_block < chunk_end; k++) {
 		const struct psr_cluster *cluster = &b->cluster[k];
 		const uint32_t cluster_end = cluster->first_block + cluster->n_blocks;
 		const uint32_t end = cluster_end < chunk_end ? cluster_end : chunk_end;
-		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
+		uint32_t first = cluster->first_block > chunk->first_block ? cluster->first_block : chunk->first_block;
 
-		if (!cull_is_chosen(cull->bins, in, cluster))
+		if (!cull_is_chosen(to->bins, in, cluster))
 			continue;
 		const struct cull_sphere v = cull_view_cluster(in, cluster);
 		if (!cull_sees_sphere(plan, &v))
@@ -135,14 +112,35 @@ static void count_chunk(int i, void *userdata)
 			n = cull_next_batch(in, first, end);
 			if (in->cull.cubes != NULL && !cull_sees_run(plan, in, first))
 				continue;
-			chunk.n_tested += n;
-			cull->simd->cull(&batch, &in->cull, first, n);
-			take_batch(&to, &batch, first, n);
+			chunk->n_tested += n;
+			to->simd->cull(&batch, &in->cull, first, n);
+			take_batch(to, &batch, first, n);
 		}
 	}
+}
+
+static void count_chunk(int i, void *userdata)
+{
+	struct cull *cull = userdata;
+	const struct plan *plan = cull->plan;
+	struct cull_chunk chunk = cull->bins->chunk[i];
+	const struct plan_instance *in = &plan->instance[chunk.instance];
+	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
+	struct cull_hit hit[MOST_CHUNK];
+	uint64_t cubes[MOST_CHUNK];
+	struct cull_counting to = { cull->bins, cull->simd, plan, &chunk, count, hit, plan->with_runs ? cubes : NULL };
+
+	memset(count, 0, cull->n_tiles * sizeof *count);
+	if (in->cull.cubes != NULL && plan->with_runs)
+		cull_count_runs(&to);
+	else
+		count_blocks(&to);
 	chunk.n_hits = (uint32_t)(to.hit - hit);
+	chunk.n_drawn += to.cubes == NULL || in->cull.cubes == NULL ? chunk.n_hits : 0;
 	chunk.first_hit = atomic_fetch_add_explicit(&cull->n_hits, chunk.n_hits, memory_order_relaxed);
 	memcpy(cull->bins->hit + chunk.first_hit, hit, chunk.n_hits * sizeof *hit);
+	if (plan->with_runs && in->cull.cubes != NULL)
+		memcpy(cull->bins->cubes + chunk.first_hit, cubes, chunk.n_hits * sizeof *cubes);
 	cull->bins->chunk[i] = chunk;
 }
 
@@ -276,6 +274,7 @@ static int make_room(struct bins *bins, const struct cull *cull)
 	const struct plan *plan = cull->plan;
 
 	return bins_room(bins, chunk, cull->n_chunks) && bins_room(bins, hit, plan->n_slots)
+	               && (!plan->with_runs || bins_room(bins, cubes, plan->n_slots))
 	               && bins_room(bins, group, plan->n_groups)
 	               && bins_room(bins, count, (size_t)cull->n_chunks * cull->stride)
 	               && bins_room(bins, tile_begin, cull->n_tiles + 1) && bins_room(bins, by_work, cull->n_tiles)
@@ -313,7 +312,7 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		const struct cull_chunk *chunk = &cull->bins->chunk[i];
 
 		report->count[PSR_STAGE_CULL] += chunk->n_tested;
-		report->n_blocks_drawn += chunk->n_hits;
+		report->n_blocks_drawn += chunk->n_drawn;
 		report->n_samples_drawn += chunk->n_samples;
 		report->levels |= chunk->levels;
 		note_levels(cull, chunk, report);

@@ -10,6 +10,36 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 
 /* ---- for the files of the cull ---- */
 
+/* n_drawn: blocks or cubes, where n_hits are entries of runs. */
+struct cull_chunk {
+	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits, n_drawn;
+	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
+	uint8_t flags, traits; /* of all hits, OR-ed */
+	uint64_t n_samples;
+	float place_error; /* greatest of its blocks, in pixels */
+};
+
+/* A chunk whose blocks are being tested, and where its results go. */
+struct cull_counting {
+	const struct bins *bins;
+	const struct simd *simd;
+	const struct plan *plan;
+	struct cull_chunk *chunk;
+	uint32_t *count;
+	struct cull_hit *hit; /* the next one */
+	uint64_t *cubes;      /* likewise; NULL in plans without runs */
+};
+
+static inline void cull_count_tiles(const struct cull_counting *to, const struct cull_hit *hit)
+{
+	for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
+		for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
+			to->count[y * to->plan->tiles_x + x]++;
+}
+
+/* Tests the cubes of a chunk, by runs. */
+void cull_count_runs(struct cull_counting *to);
+
 struct cull_group {
 	uint8_t level; /* of the cluster that is drawn */
 	uint8_t fits;
@@ -57,6 +87,13 @@ struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struc
 /* Returns 0 if nothing within the sphere can draw: it is outside of the picture, grown by the guard band of the
  * coarsest depth buffer. */
 int cull_sees_sphere(const struct plan *plan, const struct cull_sphere *sphere);
+/* Finds what pixels a sphere may cover, as coordinates: bound[0] of x, least and greatest. It must reach beyond
+ * near_z. */
+void cull_bound_sphere(float bound[2][2], const struct plan *plan, const struct cull_sphere *sphere);
+/* Finds how the leaves of a run face, MIXED if that is not known; flags: those of one of its cubes, all of which are of
+ * one side or of two. */
+enum cull_facing { CULL_AWAY, CULL_MIXED, CULL_FACES_EYE };
+enum cull_facing cull_run_faces(const struct plan_instance *in, const struct psr_cube_bound *bound, uint8_t flags);
 /* Returns 0 if nothing of the run that holds this cube can draw: it is outside of the picture, or faces away. */
 int cull_sees_run(const struct plan *plan, const struct plan_instance *in, uint32_t cube);
 

@@ -9,7 +9,8 @@ struct renderer_need {
 	unsigned pass;            /* the last one */
 	unsigned n_shadow_lights;
 	int has_sheer;            /* some model has samples that let light through */
-	int with_splats;          /* and octrees in the scene */
+	int has_octrees;          /* some instance is drawn as one */
+	int with_splats;          /* and that is so */
 	int n_threads;            /* of the pool */
 	uint64_t n_blocks;        /* of all instances */
 };

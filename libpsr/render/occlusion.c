@@ -1,4 +1,5 @@
 #include "base/maths.h"
+#include "cull.h"
 #include "warp.h"
 
 #define LOOK_EVERY 1024 /* blocks drawn between two looks at the tile */
@@ -72,13 +73,19 @@ static int is_occluded(const struct occlusion *o, const struct warp_target *t, c
 	return 1;
 }
 
+/* How many blocks or cubes an entry is. */
+static inline uint32_t n_blocks_of(const struct warp_target *t, const struct bin_entry *entry)
+{
+	return t->cubes != NULL && t->instance[entry->instance].cubes != NULL ? cull_count_bits(t->cubes[entry->hit]) : 1;
+}
+
 struct warp_counts warp_near_to_far(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                                     const struct warp_target *target, uint32_t begin, uint32_t end)
 {
 	struct warp_counts counts = { 0, 0, 1 };
 	struct occlusion occlusion = { .is_known = 0 };
 	struct bin_entry some[64];
-	uint32_t n = 0, n_drawn = 0, n_left_out = 0; /* the latter two since the last look */
+	uint32_t n = 0, n_drawn = 0, n_left_out = 0; /* entries; the latter two blocks since the last look */
 	int is_over = 0;
 
 	if (!sort_by_depth(plan, bins, begin, end))
@@ -87,14 +94,14 @@ struct warp_counts warp_near_to_far(const struct simd *simd, const struct plan *
 		const struct bin_entry *entry = &bins->entry[bins->order[i]];
 
 		if (is_occluded(&occlusion, target, &bins->hit[entry->hit])) {
-			n_left_out++;
+			n_left_out += n_blocks_of(target, entry);
 			continue;
 		}
 		some[n++] = *entry;
-		if (n < 64)
+		n_drawn += n_blocks_of(target, entry);
+		if (n < 64 && (n_drawn < LOOK_EVERY || is_over))
 			continue;
 		counts.n_inside += warp_entries(simd, plan, target, some, n);
-		n_drawn += n;
 		n = 0;
 		if (n_drawn >= LOOK_EVERY && !is_over) {
 			is_over = occlusion.is_known && n_left_out * WORTH < n_drawn;

@@ -271,6 +271,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->with_splats = settings->with_splats;
 	plan->asks_ewa = settings->with_ewa;
 	plan->with_ewa = settings->with_ewa && plan->has_octrees;
+	plan->with_runs = plan->has_octrees && !plan->with_ewa && !plan->with_splats && !plan->is_full;
 	plan->is_smooth = settings->smooth != PSR_SMOOTH_NONE;
 	plan->is_wide = settings->is_wide;
 	plan->cancel = settings->cancel;

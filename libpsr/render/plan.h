@@ -33,6 +33,7 @@ struct plan {
 	int perspective;
 	int with_splats;
 	int asks_ewa, with_ewa; /* the latter: and an instance is drawn as an octree */
+	int with_runs;          /* bins->cubes says which cubes of a run an entry draws; else each is an entry */
 	int is_smooth;
 	int is_wide;
 	unsigned cull_tests;

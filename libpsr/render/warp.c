@@ -1,7 +1,8 @@
+#include "cull.h"
 #include "sheer.h"
 #include "warp.h"
 
-#define RUN 1024     /* blocks warped between two questions */
+#define RUN 1024     /* blocks, or cubes, warped between two questions */
 #define POINTS_RUN 256 /* differential points, each of which may cover the tile */
 
 /* The most frequent level above 0 among a tile's blocks; 0 if there is none. */
@@ -27,12 +28,14 @@ static inline warp_fn *kernel_of(const struct simd *simd, const struct plan *pla
 	return in->cubes == NULL ? simd->warp : plan->with_ewa ? simd->ewa_words : simd->warp_leaves;
 }
 
-/* Of a group of differential points; else 0. */
-static inline uint32_t n_points_of(const struct plan *plan, const struct bin_entry *entry)
+/* How much of a run between two questions an entry takes: points of a group, cubes of a run, or 0 for what callers count. */
+static inline uint32_t work_of(const struct plan *plan, const struct warp_target *target, const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &plan->warp[entry->instance];
 
-	return in->points != NULL ? in->points->model->set->group[entry->slot - in->first_slot].n : 0;
+	if (in->points != NULL)
+		return in->points->model->set->group[entry->slot - in->first_slot].n;
+	return in->cubes != NULL && target->cubes != NULL ? cull_count_bits(target->cubes[entry->hit]) : 0;
 }
 
 uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
@@ -44,16 +47,16 @@ uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const st
 		return simd->warp(target, entry, n);
 	for (uint32_t first = 0, end = 0; first < n; first = end) {
 		warp_fn *warp = kernel_of(simd, plan, &entry[first]);
-		uint32_t left = POINTS_RUN;
+		uint32_t left = warp == simd->warp_points ? POINTS_RUN : RUN;
 
-		if (warp == simd->warp_points && plan_is_cancelled(plan))
+		if (warp != simd->warp && plan_is_cancelled(plan))
 			break;
 		for (; end < n && kernel_of(simd, plan, &entry[end]) == warp; end++) {
-			const uint32_t n_points = n_points_of(plan, &entry[end]);
+			const uint32_t work = work_of(plan, target, &entry[end]);
 
-			if (n_points > left)
+			if (work > left)
 				break;
-			left -= n_points;
+			left -= work;
 		}
 		n_inside += warp(target, entry + first, end - first);
 	}
@@ -108,8 +111,9 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct plan *plan, c
 int warp_looks(const struct plan *plan, uint32_t n)
 {
 	const uint32_t least = 6144; /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
+	const uint32_t share = plan->with_runs ? CUBES_RUN : 1;
 
-	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least || plan->is_full);
+	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least / share || plan->is_full);
 }
 
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
@@ -122,6 +126,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	warp_target_make(&target, plan, into->stack, tile, into->own);
 	target.clean = into->clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
+	target.cubes = plan->with_runs ? bins->cubes : NULL;
 	if (warp_looks(plan, end - begin)) {
 		simd->warp_clear(&target, into->stack->levels);
 		counts = warp_near_to_far(simd, plan, bins, &target, begin, end);

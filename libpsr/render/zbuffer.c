@@ -42,6 +42,7 @@ void warp_target_make(struct warp_target *t, const struct plan *plan, const stru
 {
 	t->instance = plan->warp;
 	t->direction = psr_direction_tens();
+	t->cubes = NULL;
 	t->near_z = plan->near_z;
 	t->perspective = plan->perspective;
 	uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;

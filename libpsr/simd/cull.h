@@ -59,6 +59,15 @@ static inline int32_t screen_range(int32_t first, int32_t last)
 #define CONE_SLACK 0.0027f
 
 #define CULL_BATCH 64
+
+/* What a batch of cubes has together, of those that are left. */
+struct cull_sum {
+	uint64_t left, mixed; /* bit i: of cube i */
+	int32_t x0, x1, y0, y1;
+	int32_t tiles[2], level[2]; /* least and greatest: all are alike where both are the same; see cull_tiles() */
+	float near, apart, depth_error; /* the least, and the greatest two */
+};
+
 struct cull_batch {
 	int32_t is_left[CULL_BATCH];  /* 1: the block may show; 0: it cannot, and its other values mean nothing */
 	int32_t is_mixed[CULL_BATCH]; /* 1: some of its samples may face away */
@@ -72,9 +81,17 @@ struct cull_batch {
 	float apart[CULL_BATCH];       /* how far neighbouring samples are from each other, in pixels, at most */
 	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels; of a leaf, half its diagonal; of points,
 	                                * how far they may be off */
+	struct cull_sum sum;           /* of cubes alone */
 };
 
-/* Culls blocks first .. first + n - 1, n at most CULL_BATCH, by frustum and cone. Cubes are of one level. */
+/* The tiles that cube i of a batch can draw into, as one number. */
+static inline int32_t cull_tiles(const struct cull_batch *batch, uint32_t i)
+{
+	return batch->tile_x0[i] | batch->tile_x1[i] << 8 | batch->tile_y0[i] << 16 | batch->tile_y1[i] << 24;
+}
+
+/* Culls blocks first .. first + n - 1, n at most CULL_BATCH, by frustum and cone. Cubes are of one level.
+ * cull_cones: culls cubes by their cones, which they must have. Fills is_left, is_mixed, sum.left and sum.mixed. */
 typedef void cull_fn(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n);
 
 #endif

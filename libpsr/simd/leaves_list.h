@@ -63,34 +63,84 @@ static inline void next_cubes(struct warp_cube *cubes, const struct warp_target 
 typedef void list_cube_fn(struct words *words, struct cells *cells, const struct warp_target *t,
                           const struct bin_entry *entry, const struct warp_cube *cube);
 
-/* The warp, given a function that lists a cube; both lists have room for a cube at each call. */
+/* Prepares the first BLOCKS cubes of *left, or all of them, and takes them away. */
+static inline uint32_t make_run(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
+                                uint64_t *left)
+{
+	const struct warp_instance *in = &t->instance[entry->instance];
+	uint32_t n = 0;
+
+	for (; *left && n < BLOCKS; *left &= *left - 1)
+		warp_cube_make(&cubes[n++], in, entry->slot + (uint32_t)__builtin_ctzll(*left));
+	return n;
+}
+
+/* The lists of a warp under way. */
+struct leaves_lists {
+	struct words words;
+	struct cells cells;
+	uint64_t n_inside;
+};
+
+/* Lists an entry's cube, given a function that does; both lists have room for a cube at each call. */
+static inline __attribute__((always_inline)) void list_leaves_of(struct leaves_lists *to, list_cube_fn *list_cube,
+                                                                 const struct warp_target *target,
+                                                                 const struct bin_entry *entry,
+                                                                 const struct warp_cube *cube)
+{
+	if (to->words.n > LIST - PSR_BLOCK_SAMPLES) {
+		to->n_inside += to->words.n;
+		lower_words(target->word, &to->words);
+	}
+	if (entry->level && (entry->level != to->cells.level || to->cells.n > LIST - PSR_BLOCK_SAMPLES)) {
+		lower_cells(target, &to->cells);
+		to->cells.level = entry->level;
+	}
+	list_cube(&to->words, &to->cells, target, entry, cube);
+}
+
+/* An entry's cubes follow each other in memory, which the processor foresees; where those of the next one begin, it
+ * does not. */
+static inline void fetch_run(const struct warp_target *t, const struct bin_entry *entry)
+{
+	const struct psr_cubes *cubes = t->instance[entry->instance].cubes->model;
+	const uint32_t cube = entry->slot - t->instance[entry->instance].first_slot
+	                      + (uint32_t)__builtin_ctzll(t->cubes[entry->hit]);
+	const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
+
+	__builtin_prefetch(level->tree->code + psr_cubes_code(cubes, level, cube));
+	__builtin_prefetch(&cubes->cube[cube + 4]);
+}
+
+/* The warp, given a function that lists a cube. */
 static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *list_cube,
                                                                 const struct warp_target *target,
                                                                 const struct bin_entry *entry, uint32_t n)
 {
-	struct words words;
-	struct cells cells;
+	struct leaves_lists lists;
 	struct warp_cube cubes[BLOCKS];
-	uint64_t n_inside = 0;
 
-	words.n = cells.n = cells.level = 0;
+	lists.n_inside = lists.words.n = lists.cells.n = lists.cells.level = 0;
 	for (uint32_t e = 0; e < n; e++) {
-		if (e % BLOCKS == 0)
-			next_cubes(cubes, target, entry, e, n, 0);
-		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
-			n_inside += words.n;
-			lower_words(target->word, &words);
+		if (target->cubes == NULL) {
+			if (e % BLOCKS == 0)
+				next_cubes(cubes, target, entry, e, n, 0);
+			list_leaves_of(&lists, list_cube, target, &entry[e], &cubes[e % BLOCKS]);
+			continue;
 		}
-		if (entry[e].level && (entry[e].level != cells.level || cells.n > LIST - PSR_BLOCK_SAMPLES)) {
-			lower_cells(target, &cells);
-			cells.level = entry[e].level;
+		if (e + 1 < n)
+			fetch_run(target, &entry[e + 1]);
+		for (uint64_t left = target->cubes[entry[e].hit]; left;) {
+			const uint32_t n_cubes = make_run(cubes, target, &entry[e], &left);
+
+			for (uint32_t i = 0; i < n_cubes; i++)
+				list_leaves_of(&lists, list_cube, target, &entry[e], &cubes[i]);
 		}
-		list_cube(&words, &cells, target, &entry[e], &cubes[e % BLOCKS]);
 	}
-	n_inside += words.n;
-	lower_words(target->word, &words);
-	lower_cells(target, &cells);
-	return n_inside;
+	lists.n_inside += lists.words.n;
+	lower_words(target->word, &lists.words);
+	lower_cells(target, &lists.cells);
+	return lists.n_inside;
 }
 
 #endif

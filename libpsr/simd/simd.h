@@ -18,7 +18,7 @@
 #include "warp.h"
 
 struct simd {
-	cull_fn *cull;
+	cull_fn *cull, *cull_cones;
 	warp_far_fn *warp_far;
 	warp_clear_fn *warp_clear;
 	warp_cells_fn *warp_cells;

@@ -95,6 +95,9 @@ struct warp_target {
 	int32_t above, below; /* rows of the tile that are not the target's: differential points are counted there, too */
 	uint32_t clean; /* bits of parts whose words are empty before the tile is cleared */
 	uint32_t bare;  /* bits of parts where nothing is drawn */
+	/* By bin_entry.hit, what an entry of cubes draws: bit i the cube of its slot + i. All are of one run. NULL: each
+	 * entry of cubes is one. */
+	const uint64_t *cubes;
 	struct ewa_sum *sum; /* of pixel (x0, y0), for ewa_sums */
 	uint32_t sum_stride;
 	struct warp_cells {

@@ -375,7 +375,8 @@ uint64_t draw_bytes(const struct psr_msg_frame *request, const struct scene *sce
 		.width = request->width, .height = request->height, .n_threads = n_threads,
 		.pass = pass > request->pass_limit ? pass : request->pass_limit,
 		.n_shadow_lights = scene_shadow_lights(scene), .has_sheer = scene_has_sheer(scene),
-		.n_blocks = scene_blocks(scene), .with_splats = request->settings.splats && scene_has_octrees(scene),
+		.n_blocks = scene_blocks(scene), .has_octrees = scene_has_octrees(scene),
+		.with_splats = request->settings.splats && scene_has_octrees(scene),
 	};
 
 	return renderer_need(&need) + planes_bytes(request->planes, (uint64_t)request->width * request->height,

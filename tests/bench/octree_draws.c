@@ -1,9 +1,10 @@
-/* What drawing an octree costs: octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] MESH|CLOUD.las [BLOCKS.psr]
+/* What drawing an octree costs:
+ * octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] [-p] MESH|CLOUD.las [BLOCKS.psr]
  *
- * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. Frames of
- * points, of EWA splats, and with blocks of the same object those of blocks take turns, and their times are medians; then
- * those of stages. Points a second are those of cull and warp together, splats likewise; the latter have a target, of
- * two threads at 512x512 and leaves of about a pixel. */
+ * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. Frames
+ * of points, of EWA splats (-p leaves them out), and with blocks of the same object those of blocks take turns, and
+ * their times are medians; then those of stages. Points a second are those of cull and warp together, splats likewise;
+ * the latter have a target, of two threads at 512x512 and leaves of about a pixel. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -187,7 +188,7 @@ static int measure(const struct bench *bench, const struct subject *subject, int
 			printf("%-10g %7s %9.2f of %s\n", 1 / nearer[d], "ratio",
 			       stats_median(times[0].frame, (size_t)times[0].n) / stats_median(times[s].frame, (size_t)times[s].n),
 			       subject[s].name);
-		if (nearer[d] == 1)
+		if (nearer[d] == 1 && n_subjects > 1 && subject[1].with_splats)
 			print_target(&times[0], &times[1]);
 	}
 	return PSR_OK;
@@ -197,7 +198,7 @@ static int measure(const struct bench *bench, const struct subject *subject, int
 struct wish {
 	struct octree_build_options options;
 	uint32_t side;
-	int n_rounds, n_threads;
+	int n_rounds, n_threads, without_splats;
 };
 
 static int run(const char *path, const char *blocks, const struct wish *wish, struct psr_error *err)
@@ -206,6 +207,7 @@ static int run(const char *path, const char *blocks, const struct wish *wish, st
 	struct subject subject[MOST_SUBJECTS] = { { "points", NULL, PSR_OCTREE, 0 }, { "splats", NULL, PSR_OCTREE, 1 },
 		                                      { "blocks", NULL, PSR_BLOCKS, 0 } };
 	struct bench bench = { .frame = { .width = side, .height = side }, .side = side };
+	int n_subjects = blocks != NULL ? 3 : 2;
 	struct octree *tree = NULL;
 	int rc = blocks != NULL ? psr_model_read(&subject[2].model, blocks, err) : PSR_OK;
 
@@ -228,8 +230,14 @@ static int run(const char *path, const char *blocks, const struct wish *wish, st
 	rc = psr_renderer_create(&bench.renderer, err);
 	if (rc == PSR_OK)
 		rc = psr_pool_create(&bench.pool, wish->n_threads, err);
+	if (wish->without_splats) {
+		psr_model_unref(subject[1].model);
+		subject[1] = subject[2];
+		subject[2].model = NULL;
+		n_subjects--;
+	}
 	if (rc == PSR_OK)
-		rc = measure(&bench, subject, blocks != NULL ? 3 : 2, wish->n_rounds, err);
+		rc = measure(&bench, subject, n_subjects, wish->n_rounds, err);
 	psr_pool_destroy(bench.pool);
 	psr_renderer_destroy(bench.renderer);
 	for (int s = 0; s < MOST_SUBJECTS; s++)
@@ -244,16 +252,18 @@ int main(int argc, char **argv)
 	int option, rc;
 
 	octree_build_options_default(&wish.options);
-	while ((option = getopt(argc, argv, "l:s:n:t:")) != -1) {
+	while ((option = getopt(argc, argv, "l:s:n:t:p")) != -1) {
 		if (option == '?')
 			return 2;
 		wish.options.levels = option == 'l' ? atoi(optarg) : wish.options.levels;
 		wish.side = option == 's' ? (uint32_t)atoi(optarg) : wish.side;
 		wish.n_rounds = option == 'n' ? atoi(optarg) : wish.n_rounds;
 		wish.n_threads = option == 't' ? atoi(optarg) : wish.n_threads;
+		wish.without_splats |= option == 'p';
 	}
 	if (optind >= argc || wish.side == 0 || wish.n_rounds * DIRECTIONS > MOST_FRAMES) {
-		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] MESH|CLOUD.las [BLOCKS.psr]\n");
+		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] [-p] MESH|CLOUD.las "
+		                "[BLOCKS.psr]\n");
 		return 2;
 	}
 	rc = run(argv[optind], optind + 1 < argc ? argv[optind + 1] : NULL, &wish, &err);

@@ -8,7 +8,7 @@
 #define MAX_LEVELS 3
 
 enum numbers { PLAIN, SPOILT };
-enum kernel { LEAVES, WORDS, SUMS };
+enum kernel { LEAVES, RUNS, WORDS, SUMS };
 
 /* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0: any. */
 static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, struct psr_cube *cube,
@@ -136,6 +136,26 @@ static void splats(struct check *c, struct picture *p, struct warp_instance *in,
 	memset(t->sum, 0, n * sizeof *t->sum);
 }
 
+/* Entries of random cubes become entries of their runs, which end with their level; for benchmarks whole ones. */
+static const uint64_t *random_runs(struct check *c, const struct psr_cubes *cubes, uint32_t first_slot,
+                                   struct bin_entry *entry, uint32_t n_entries, int are_whole)
+{
+	uint64_t *mask = check_in(c, n_entries, sizeof *mask);
+
+	for (uint32_t e = 0; e < n_entries; e++) {
+		const struct psr_cube_level *level = psr_cubes_level(cubes, entry[e].slot - first_slot);
+
+		if (are_whole || check_one_in(c, 2)) /* chunks of a cull may begin within a run */
+			entry[e].slot = first_slot + level->first;
+		const uint64_t all = UINT64_MAX >> (CUBES_RUN - (level->first + level->n - (entry[e].slot - first_slot)));
+		const uint64_t some = are_whole || check_one_in(c, 4) ? all : check_u64(c) & check_u64(c) & all;
+
+		entry[e].hit = n_entries - 1 - e;
+		mask[entry[e].hit] = some ? some : 1;
+	}
+	return mask;
+}
+
 static warp_fn *kernel_of(const struct simd *simd, enum kernel kernel)
 {
 	return kernel == WORDS ? simd->ewa_words : kernel == SUMS ? simd->ewa_sums : simd->warp_leaves;
@@ -146,7 +166,8 @@ static void draw_cubes(struct check *c, struct picture *p, enum kernel kernel, u
 {
 	struct warp_target *t = &p->target;
 	struct octree tree[MAX_LEVELS];
-	struct psr_cubes *cubes = random_cubes(c, 1 + check_below(c, n_leaves > 0 ? 64 : 20), n_leaves, tree);
+	struct psr_cubes *cubes = random_cubes(c, n_leaves > 0 ? 64 : 1 + check_below(c, kernel == RUNS ? 64 : 20), n_leaves,
+	                                       tree);
 	struct warp_instance *in = check_in(c, 1, sizeof *in);
 	struct warp_cubes *to = check_in(c, 1, sizeof *to);
 	struct bin_entry *entry = check_in(c, n_entries, sizeof *entry);
@@ -159,7 +180,8 @@ static void draw_cubes(struct check *c, struct picture *p, enum kernel kernel, u
 	in->cubes = to;
 	in->first_slot = check_below(c, (1u << 26) - 1 - cubes->groups.n_blocks);
 	picture_sight(c, in, t, numbers == SPOILT);
-	if (kernel != LEAVES)
+	t->cubes = NULL;
+	if (kernel == WORDS || kernel == SUMS)
 		splats(c, p, in, to);
 	for (uint32_t e = 0; e < n_entries; e++) {
 		const uint32_t cube = check_below(c, cubes->groups.n_blocks);
@@ -171,7 +193,9 @@ static void draw_cubes(struct check *c, struct picture *p, enum kernel kernel, u
 			                           .is_wide = (uint8_t)(n_leaves == 0 ? check_below(c, 2) : p->levels != 0) };
 		entry[e].is_mixed = !(cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED) && n_leaves == 0;
 	}
-	check_units(c, (uint64_t)n_entries * n_leaves);
+	if (kernel == RUNS)
+		t->cubes = random_runs(c, cubes, in->first_slot, entry, n_entries, n_leaves > 0);
+	check_units(c, (uint64_t)n_entries * n_leaves * (kernel == RUNS ? cubes->groups.n_blocks : 1));
 	while (check_next(c))
 		check_result(c, kernel_of(c->simd, kernel)(t, entry, n_entries));
 }
@@ -187,6 +211,22 @@ static void random_leaves(struct check *c)
 
 	picture_random(c, &p);
 	leaves(c, &p, check_below(c, 40), 0, PLAIN);
+}
+
+static void random_masks(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	draw_cubes(c, &p, RUNS, check_below(c, 8), 0, PLAIN);
+}
+
+static void spoilt_masks(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	draw_cubes(c, &p, RUNS, 1 + check_below(c, 3), 0, SPOILT);
 }
 
 static void spoilt_numbers(struct check *c)
@@ -270,12 +310,22 @@ static void bench_offsets(struct check *c)
 	leaves(c, &p, 1600, 16, PLAIN);
 }
 
+static void bench_runs(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	draw_cubes(c, &p, RUNS, 25, 16, PLAIN);
+}
+
 int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
 		{ "warp_leaves: random cubes, tiles and levels", random_leaves, 2000, NULL },
 		{ "warp_leaves: infinite, huge, denormal and no numbers", spoilt_numbers, 2000, NULL },
 		{ "warp_leaves: tiles narrower than a vector", narrow_tiles, 500, NULL },
+		{ "warp_leaves: any cubes of runs", random_masks, 1000, NULL },
+		{ "warp_leaves: any cubes of runs, infinite, huge, denormal and no numbers", spoilt_masks, 1000, NULL },
 		{ "ewa_words: random cubes and tiles", random_splat_words, 12, NULL },
 		{ "ewa_sums: random cubes and tiles", random_splat_sums, 12, NULL },
 		{ "ewa_words and ewa_sums: infinite, huge, denormal and no numbers", spoilt_splats, 60, NULL },
@@ -284,6 +334,7 @@ int main(int argc, char **argv)
 		{ "warp_leaves, full cubes", bench_full, 0, "leaf" },
 		{ "warp_leaves, cubes a fourth full", bench_fourths, 0, "leaf" },
 		{ "warp_leaves, these with offsets and depth level 1", bench_offsets, 0, "leaf" },
+		{ "warp_leaves, cubes a fourth full in runs", bench_runs, 0, "leaf" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }

@@ -98,14 +98,14 @@ uint64_t warp_c(const struct warp_target *target, const struct bin_entry *entry,
 	return n_inside;
 }
 
-static uint64_t warp_cube(const struct warp_target *t, const struct bin_entry *entry)
+static uint64_t warp_cube(const struct warp_target *t, const struct bin_entry *entry, uint32_t slot)
 {
 	const struct warp_instance *in = &t->instance[entry->instance];
 	struct warp_cube cube;
 	uint64_t n_inside = 0;
 	uint32_t k = 0;
 
-	warp_cube_make(&cube, in, entry->slot);
+	warp_cube_make(&cube, in, slot);
 	const int with_offsets = entry->is_wide && cube.offset != NULL;
 	const struct warp_octants *octants = cube.octants;
 	for (uint64_t left = cube.mask; left; left &= left - 1, k++) {
@@ -136,6 +136,7 @@ uint64_t warp_leaves_c(const struct warp_target *target, const struct bin_entry 
 	uint64_t n_inside = 0;
 
 	for (uint32_t e = 0; e < n; e++)
-		n_inside += warp_cube(target, &entry[e]);
+		for (uint64_t left = target->cubes != NULL ? target->cubes[entry[e].hit] : 1; left; left &= left - 1)
+			n_inside += warp_cube(target, &entry[e], entry[e].slot + (uint32_t)__builtin_ctzll(left));
 	return n_inside;
 }

@@ -135,6 +135,72 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 	}
 }
 
+static inline int32_t least(int32_t a, int32_t b)
+{
+	return a < b ? a : b;
+}
+
+static inline int32_t greatest(int32_t a, int32_t b)
+{
+	return a > b ? a : b;
+}
+
+/* Integers that are in the order of floats. */
+static inline int32_t order_of(int32_t bits)
+{
+	return bits ^ (bits >> 31 & INT32_MAX);
+}
+
+/* n: whole vectors. */
+static void sum_masks(struct cull_sum *restrict sum, const struct cull_batch *restrict b, uint32_t n)
+{
+	sum->left = sum->mixed = 0;
+	for (uint32_t i = 0; i < n; i += LANES) {
+		uint32_t left = 0, mixed = 0;
+
+		for (uint32_t k = 0; k < LANES; k++) {
+			left |= (uint32_t)b->is_left[i + k] << k;
+			mixed |= (uint32_t)(b->is_left[i + k] & b->is_mixed[i + k]) << k;
+		}
+		sum->left |= (uint64_t)left << i;
+		sum->mixed |= (uint64_t)mixed << i;
+	}
+}
+
+static void sum_up(struct cull_sum *restrict sum, const struct cull_batch *restrict b, uint32_t n)
+{
+	int32_t x0 = INT32_MAX, x1 = 0, y0 = INT32_MAX, y1 = 0, near = INT32_MAX, apart = 0, depth_error = 0;
+	int32_t tiles0 = INT32_MAX, tiles1 = 0, level0 = INT32_MAX, level1 = 0;
+
+	for (uint32_t i = 0; i < n; i++) {
+		const int32_t out = b->is_left[i] - 1, most = out & INT32_MAX; /* all ones: not left */
+		const int32_t tiles = cull_tiles(b, i);
+
+		x0 = least(x0, b->x0[i] | most);
+		x1 = greatest(x1, b->x1[i] & ~out);
+		y0 = least(y0, b->y0[i] | most);
+		y1 = greatest(y1, b->y1[i] & ~out);
+		tiles0 = least(tiles0, tiles | most);
+		tiles1 = greatest(tiles1, tiles & ~out);
+		level0 = least(level0, b->level[i] | most);
+		level1 = greatest(level1, b->level[i] & ~out);
+		near = least(near, (order_of((int32_t)psr_bits_from_float(b->near[i])) & ~out) | most);
+		apart = greatest(apart, (int32_t)psr_bits_from_float(b->apart[i]) & ~out);
+		depth_error = greatest(depth_error, (int32_t)psr_bits_from_float(b->depth_error[i]) & ~out);
+	}
+	sum->x0 = x0;
+	sum->x1 = x1;
+	sum->y0 = y0;
+	sum->y1 = y1;
+	sum->tiles[0] = tiles0;
+	sum->tiles[1] = tiles1;
+	sum->level[0] = level0;
+	sum->level[1] = level1;
+	sum->near = psr_float_from_bits((uint32_t)order_of(near));
+	sum->apart = psr_float_from_bits((uint32_t)apart);
+	sum->depth_error = psr_float_from_bits((uint32_t)depth_error);
+}
+
 static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n)
 {
 	const uint32_t whole = (n + LANES - 1) / LANES * LANES;
@@ -155,4 +221,26 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 		widen_cones(&blocks, view->blocks, first, n);
 		cull_by_cones(out, view, &blocks, whole);
 	}
+	if (view->cubes) {
+		for (uint32_t i = n; i < whole; i++)
+			out->is_left[i] = 0;
+		sum_masks(&out->sum, out, whole);
+		sum_up(&out->sum, out, whole);
+	}
+}
+
+static void cull_cones(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n)
+{
+	const uint32_t whole = (n + LANES - 1) / LANES * LANES;
+	struct widened cubes;
+
+	memset(&cubes, 0, sizeof cubes);
+	widen_cubes(&cubes, view->cubes, first, n);
+	for (uint32_t i = 0; i < whole; i++) {
+		out->is_left[i] = i < n;
+		out->is_mixed[i] = !(cubes.flags[i] & PSR_BLOCK_TWO_SIDED) & !view->both_sides;
+	}
+	widen_cones(&cubes, view->blocks, first, n);
+	cull_by_cones(out, view, &cubes, whole);
+	sum_masks(&out->sum, out, whole);
 }

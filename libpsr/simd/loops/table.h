@@ -17,6 +17,7 @@
 
 #define SIMD_TABLE(isa, look_kernel, KERNEL) { \
 	.cull = cull,                                  \
+	.cull_cones = cull_cones,                      \
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
 	.warp_cells = warp_cells,                      \

@@ -187,7 +187,7 @@ static void splats_take_no_more_than_was_foreseen(void **state)
 	for (int i = 0; i < 3; i++)
 		for (int is_fine = 0; is_fine < 2; is_fine++) {
 			struct renderer_need need = { .width = sides[i], .height = sides[i], .pass = (unsigned)is_fine, .n_threads = 1,
-				                          .n_blocks = psr_model_cubes(knot)->groups.n_blocks, .with_splats = 1 };
+				                          .n_blocks = psr_model_cubes(knot)->groups.n_blocks, .has_octrees = 1, .with_splats = 1 };
 			const uint64_t bytes = splats_bytes(knot, sides[i], is_fine ? PSR_SMOOTH_FINE : PSR_SMOOTH_EDGES);
 
 			assert_true(bytes <= renderer_need(&need));

@@ -1,0 +1,234 @@
+/* Cubes by runs of 64: those of a run that are drawn alike, in the same tiles, are one hit. Most runs are of one level,
+ * in one tile and before the eye: then the run's bound tells all but how its cubes face. */
+#include "base/vec.h"
+#include "cull.h"
+
+#define ROUNDING 1e-4f /* more than what floats are off by, of lengths that are compared with cubes' */
+
+/* What the hits of a run have in common. */
+struct alike {
+	float near;
+	int32_t level, tiles; /* the latter as cull_tiles() */
+	int32_t x[2], y[2];
+};
+
+/* ---- counting ---- */
+
+static uint32_t leaf_of(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube)
+{
+	return cube < level->first + level->n ? psr_cubes_leaf(cubes, level, cube) : (uint32_t)level->tree->n_leaves;
+}
+
+/* The leaves of the cubes of a mask. Cubes that follow each other are counted at once. */
+static uint64_t count_leaves(const struct psr_cubes *cubes, uint32_t first, uint64_t mask)
+{
+	const struct psr_cube_level *level = psr_cubes_level(cubes, first);
+	uint64_t n = 0;
+
+	while (mask) {
+		const uint32_t from = (uint32_t)__builtin_ctzll(mask);
+		const uint64_t others = ~(mask | ((UINT64_C(1) << from) - 1));
+		const uint32_t end = others ? (uint32_t)__builtin_ctzll(others) : CUBES_RUN;
+
+		n += leaf_of(cubes, level, first + end) - leaf_of(cubes, level, first + from);
+		mask &= end < CUBES_RUN ? UINT64_MAX << end : 0;
+	}
+	return n;
+}
+
+static void put_hit(struct cull_counting *to, const struct alike *alike, uint32_t first, uint64_t mask, int is_mixed)
+{
+	const struct plan *plan = to->plan;
+	struct cull_hit *hit = to->hit;
+	const int level = alike->level < PSR_MAX_DEPTH_LEVEL ? alike->level : PSR_MAX_DEPTH_LEVEL;
+
+	if (!mask)
+		return;
+	*hit = (struct cull_hit){
+		.slot = plan->instance[to->chunk->instance].first_slot + first, .instance = (uint16_t)to->chunk->instance,
+		.near = alike->near, .level = (uint8_t)level, .is_mixed = is_mixed & 1, .is_wide = level > 0,
+		.x0 = (uint16_t)alike->x[0], .x1 = (uint16_t)alike->x[1],
+		.y0 = (uint16_t)alike->y[0], .y1 = (uint16_t)alike->y[1],
+		.tile_x0 = (uint8_t)alike->tiles, .tile_x1 = (uint8_t)(alike->tiles >> 8),
+		.tile_y0 = (uint8_t)(alike->tiles >> 16), .tile_y1 = (uint8_t)(alike->tiles >> 24),
+	};
+	hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == plan->width - 1) | (hit->y1 == plan->height - 1);
+	*to->cubes++ = mask;
+	to->hit++;
+	cull_count_tiles(to, hit);
+	to->chunk->levels |= 1u << level;
+	to->chunk->n_clamped += alike->level > PSR_MAX_DEPTH_LEVEL ? cull_count_bits(mask) : 0;
+}
+
+static void note_run(struct cull_counting *to, uint32_t first, uint64_t left, uint64_t mixed, float apart,
+                     float depth_error)
+{
+	const struct plan_instance *in = &to->plan->instance[to->chunk->instance];
+	const float error = cull_place_error(to->plan, in, 0, apart, depth_error);
+	struct cull_chunk *chunk = to->chunk;
+
+	chunk->flags |= in->cull.blocks->flags[first];
+	chunk->n_drawn += cull_count_bits(left);
+	chunk->n_mixed += cull_count_bits(mixed);
+	chunk->n_samples += count_leaves(in->cull.cubes, first, left);
+	chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
+}
+
+/* ---- runs of which the kernel tests each cube ---- */
+
+/* The cubes of a mask that have the level and tiles of cube i. */
+static uint64_t find_alike(const struct cull_batch *batch, uint32_t i, uint64_t mask)
+{
+	const int32_t tiles = cull_tiles(batch, i), level = batch->level[i];
+	uint64_t alike = 0;
+
+	for (uint64_t left = mask; left; left &= left - 1) {
+		const uint32_t k = (uint32_t)__builtin_ctzll(left);
+
+		alike |= (uint64_t)(cull_tiles(batch, k) == tiles && batch->level[k] == level) << k;
+	}
+	return alike;
+}
+
+/* The pixels of each hit are those of all cubes that are left. */
+static void take_batch(struct cull_counting *to, const struct cull_batch *batch, uint32_t first, uint64_t chosen)
+{
+	const struct cull_sum *sum = &batch->sum;
+	const int are_alike = sum->tiles[0] == sum->tiles[1] && sum->level[0] == sum->level[1];
+
+	for (uint64_t left = sum->left & chosen, these; left; left &= ~these) {
+		const uint32_t i = (uint32_t)__builtin_ctzll(left);
+		const struct alike alike = { sum->near, batch->level[i], cull_tiles(batch, i), { sum->x0, sum->x1 },
+			                         { sum->y0, sum->y1 } };
+
+		these = are_alike ? left : find_alike(batch, i, left);
+		put_hit(to, &alike, first, these & sum->mixed, 1);
+		put_hit(to, &alike, first, these & ~sum->mixed, 0);
+	}
+	if (sum->left & chosen)
+		note_run(to, first, sum->left & chosen, sum->mixed & chosen, sum->apart, sum->depth_error);
+}
+
+/* ---- runs of which the bound tells enough ---- */
+
+/* The smallest k >= 0 with pixels <= 2^k, as the kernel has it. */
+static int32_t level_of(float pixels)
+{
+	const int32_t bits = (int32_t)psr_bits_from_float(pixels < 0x1p100f ? pixels : 0x1p100f);
+	const int32_t exponent = ((bits + 0x7fffff) >> 23) - 127;
+
+	return exponent > 0 ? exponent : 0;
+}
+
+/* How many pixels a unit of length spans at most and at least, in the spheres of cubes in this one, whose middles are
+ * before the eye: |p| / z'^2 (cull_stretch()). */
+static void find_stretch(float stretch[2], const struct cull_view *v, const struct cull_sphere *s)
+{
+	const float far = s->c[2] + s->r, side = __builtin_sqrtf(v3f_dot(s->c, s->c)) - s->r;
+
+	stretch[0] = cull_stretch(v, s->c[0], s->c[1], s->c[2], s->r, s->c[2] - s->r) * (1 + ROUNDING);
+	stretch[1] = v->focal * (1 - ROUNDING) * (!v->perspective ? 1 : (side > far ? side : far) / (far * far));
+}
+
+/* Finds an axis' first and last pixel of the sphere. Returns whether it is within the picture, and all that its samples
+ * can reach within one tile. */
+static int find_side(int32_t side[2], const float bound[2], float band, float size, int32_t tile_size, int32_t *tile)
+{
+	const float most = size - 1, low = bound[0] - band, high = bound[1] + band;
+	const float first = bound[0] - 2 > 0 ? bound[0] - 2 : 0, last = bound[1] + 2 < most ? bound[1] + 2 : most;
+
+	if (!(bound[0] >= 0 && bound[1] <= most))
+		return 0;
+	side[0] = (int32_t)(low > 0 ? low : 0);
+	side[1] = (int32_t)(high < most ? high : most);
+	*tile = (int32_t)first / tile_size;
+	return (int32_t)last / tile_size == *tile;
+}
+
+/* Returns whether all cubes of a run are in the picture, within one tile, and need the depth buffer of one level. */
+static int find_all_alike(struct alike *out, float stretch[2], const struct plan *plan, const struct plan_instance *in,
+                          const struct psr_cube_level *level, const struct cull_sphere *sphere)
+{
+	const struct cull_view *v = &in->cull;
+	const float spacing = v->spacing * (float)(1u << (level - in->cull.cubes->level));
+	float bound[2][2];
+	int32_t tile_x, tile_y;
+
+	if (level->tree->is_cloud || !(sphere->c[2] - sphere->r > plan->near_z))
+		return 0;
+	find_stretch(stretch, v, sphere);
+	out->level = level_of(stretch[0] * spacing * (1 - 0x1p-12f));
+	if (out->level != level_of(stretch[1] * spacing * (1 - 0x1p-12f)) || out->level > PSR_MAX_DEPTH_LEVEL)
+		return 0;
+	cull_bound_sphere(bound, plan, sphere);
+	const float band = (float)(1u << out->level) + 2;
+	const int is_within = find_side(out->x, bound[0], band, v->width, TILE_WIDTH, &tile_x)
+	                      && find_side(out->y, bound[1], band, v->height, TILE_HEIGHT, &tile_y);
+	if (!is_within)
+		return 0;
+	out->near = (sphere->c[2] - sphere->r) * (1 - ROUNDING);
+	out->tiles = tile_x | tile_x << 8 | tile_y << 16 | tile_y << 24;
+	return 1;
+}
+
+static void take_run(struct cull_counting *to, uint32_t first, uint32_t n, uint64_t chosen)
+{
+	const struct plan *plan = to->plan;
+	const struct plan_instance *in = &plan->instance[to->chunk->instance];
+	const struct psr_cube_level *level = psr_cubes_level(in->cull.cubes, first);
+	const struct psr_cube_bound *bound = &level->bound[(first - level->first) / CUBES_RUN];
+	const struct cull_sphere sphere = cull_view_sphere(in, bound->center, bound->radius);
+	struct cull_batch batch;
+	struct alike alike;
+	float stretch[2];
+
+	if (!cull_sees_sphere(plan, &sphere))
+		return;
+	const enum cull_facing facing = cull_run_faces(in, bound, in->cull.blocks->flags[first]);
+	if (facing == CULL_AWAY)
+		return;
+	to->chunk->n_tested += cull_count_bits(chosen);
+	if (!find_all_alike(&alike, stretch, plan, in, level, &sphere)) {
+		to->simd->cull(&batch, &in->cull, first, n);
+		take_batch(to, &batch, first, chosen);
+		return;
+	}
+	batch.sum.left = chosen;
+	batch.sum.mixed = facing == CULL_FACES_EYE ? 0 : chosen;
+	if (facing == CULL_MIXED && in->cull.with_cones && in->cull.blocks->cone_sine != NULL)
+		to->simd->cull_cones(&batch, &in->cull, first, n);
+	const uint64_t left = batch.sum.left & chosen, mixed = batch.sum.mixed & chosen;
+	put_hit(to, &alike, first, mixed, 1);
+	put_hit(to, &alike, first, left & ~mixed, 0);
+	if (left)
+		note_run(to, first, left, mixed, stretch[0] * in->cull.spacing * (float)(1u << (level - in->cull.cubes->level)),
+		         stretch[0] * in->cull.scale * (float)(level->edge * (CUBES_DIAGONAL / 2)));
+}
+
+void cull_count_runs(struct cull_counting *to)
+{
+	const struct plan_instance *in = &to->plan->instance[to->chunk->instance];
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t end = to->chunk->first_block + to->chunk->n_blocks;
+	uint32_t k = to->chunk->first_cluster;
+
+	for (uint32_t first = to->chunk->first_block, n; first < end && !plan_is_cancelled(to->plan); first += n) {
+		const struct psr_cube_level *level = psr_cubes_level(in->cull.cubes, first);
+		const uint32_t level_end = level->first + level->n;
+		uint64_t chosen = 0;
+
+		n = cull_next_batch(in, first, end < level_end ? end : level_end);
+		while (b->cluster[k].first_block + b->cluster[k].n_blocks <= first)
+			k++;
+		for (uint32_t i = k; i < b->n_clusters && b->cluster[i].first_block < first + n; i++) {
+			const uint32_t begin = b->cluster[i].first_block, own_end = begin + b->cluster[i].n_blocks;
+			const uint64_t from = UINT64_MAX << (begin > first ? begin - first : 0);
+
+			if (cull_is_chosen(to->bins, in, &b->cluster[i]))
+				chosen |= own_end < first + n ? from & ~(UINT64_MAX << (own_end - first)) : from;
+		}
+		chosen &= n < CUBES_RUN ? ~(UINT64_MAX << n) : UINT64_MAX;
+		if (chosen)
+			take_run(to, first, n, chosen);
+	}
+}
