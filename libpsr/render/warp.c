@@ -111,9 +111,19 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct plan *plan, c
 int warp_looks(const struct plan *plan, uint32_t n)
 {
 	const uint32_t least = 6144; /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
-	const uint32_t share = plan->with_runs ? CUBES_RUN : 1;
 
-	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least / share || plan->is_full);
+	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least || plan->is_full);
+}
+
+/* How many blocks, cubes or groups of points entries stand for. */
+static uint32_t n_blocks_of(const struct warp_target *t, const struct bin_entry *entry, uint32_t n_entries)
+{
+	uint32_t n = n_entries;
+
+	for (uint32_t e = 0; t->cubes != NULL && e < n_entries; e++)
+		if (t->instance[entry[e].instance].cubes != NULL)
+			n += cull_count_bits(t->cubes[entry[e].hit]) - 1;
+	return n;
 }
 
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
@@ -127,7 +137,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	target.clean = into->clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
 	target.cubes = plan->with_runs ? bins->cubes : NULL;
-	if (warp_looks(plan, end - begin)) {
+	if (warp_looks(plan, n_blocks_of(&target, bins->entry + begin, end - begin))) {
 		simd->warp_clear(&target, into->stack->levels);
 		counts = warp_near_to_far(simd, plan, bins, &target, begin, end);
 	} else {

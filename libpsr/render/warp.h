@@ -27,7 +27,8 @@ uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const st
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile);
 
-/* Whether the warp leaves out what it finds hidden in a tile of n entries: then it draws the tile from near to far. */
+/* Whether the warp leaves out what it finds hidden in a tile of n blocks, cubes or groups: then it draws the tile from
+ * near to far. */
 int warp_looks(const struct plan *plan, uint32_t n);
 
 /* Clears a band that is a part of its tile, and draws it. */

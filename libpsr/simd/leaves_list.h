@@ -82,21 +82,30 @@ struct leaves_lists {
 	uint64_t n_inside;
 };
 
-/* Lists an entry's cube, given a function that does; both lists have room for a cube at each call. */
-static inline __attribute__((always_inline)) void list_leaves_of(struct leaves_lists *to, list_cube_fn *list_cube,
-                                                                 const struct warp_target *target,
-                                                                 const struct bin_entry *entry,
-                                                                 const struct warp_cube *cube)
+static inline void leaves_begin(struct leaves_lists *lists)
+{
+	lists->n_inside = lists->words.n = lists->cells.n = lists->cells.level = 0;
+}
+
+static inline uint64_t leaves_end(struct leaves_lists *lists, const struct warp_target *t)
+{
+	lists->n_inside += lists->words.n;
+	lower_words(t->word, &lists->words);
+	lower_cells(t, &lists->cells);
+	return lists->n_inside;
+}
+
+/* Makes room for PSR_BLOCK_SAMPLES words, and as many cells of a level. */
+static inline void make_room(struct leaves_lists *to, const struct warp_target *t, uint32_t level)
 {
 	if (to->words.n > LIST - PSR_BLOCK_SAMPLES) {
 		to->n_inside += to->words.n;
-		lower_words(target->word, &to->words);
+		lower_words(t->word, &to->words);
 	}
-	if (entry->level && (entry->level != to->cells.level || to->cells.n > LIST - PSR_BLOCK_SAMPLES)) {
-		lower_cells(target, &to->cells);
-		to->cells.level = entry->level;
+	if (level && (level != to->cells.level || to->cells.n > LIST - PSR_BLOCK_SAMPLES)) {
+		lower_cells(t, &to->cells);
+		to->cells.level = level;
 	}
-	list_cube(&to->words, &to->cells, target, entry, cube);
 }
 
 /* An entry's cubes follow each other in memory, which the processor foresees; where those of the next one begin, it
@@ -112,7 +121,19 @@ static inline void fetch_run(const struct warp_target *t, const struct bin_entry
 	__builtin_prefetch(&cubes->cube[cube + 4]);
 }
 
-/* The warp, given a function that lists a cube. */
+/* Fetches what entries after this one need first. */
+static inline void fetch_next(const struct warp_target *t, const struct bin_entry *entry, uint32_t e, uint32_t n)
+{
+	if (t->cubes != NULL) {
+		if (e + 1 < n)
+			fetch_run(t, &entry[e + 1]);
+	} else if (e % BLOCKS == 0) {
+		fetch_cubes(t, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
+		fetch_codes(t, entry + e + BLOCKS, batch_of(e + BLOCKS, n));
+	}
+}
+
+/* The warp, given a function that lists a cube; both lists have room for one at each call. */
 static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *list_cube,
                                                                 const struct warp_target *target,
                                                                 const struct bin_entry *entry, uint32_t n)
@@ -120,27 +141,19 @@ static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *li
 	struct leaves_lists lists;
 	struct warp_cube cubes[BLOCKS];
 
-	lists.n_inside = lists.words.n = lists.cells.n = lists.cells.level = 0;
+	leaves_begin(&lists);
 	for (uint32_t e = 0; e < n; e++) {
-		if (target->cubes == NULL) {
-			if (e % BLOCKS == 0)
-				next_cubes(cubes, target, entry, e, n, 0);
-			list_leaves_of(&lists, list_cube, target, &entry[e], &cubes[e % BLOCKS]);
-			continue;
-		}
-		if (e + 1 < n)
-			fetch_run(target, &entry[e + 1]);
-		for (uint64_t left = target->cubes[entry[e].hit]; left;) {
+		fetch_next(target, entry, e, n);
+		for (uint64_t left = target->cubes != NULL ? target->cubes[entry[e].hit] : 1; left;) {
 			const uint32_t n_cubes = make_run(cubes, target, &entry[e], &left);
 
-			for (uint32_t i = 0; i < n_cubes; i++)
-				list_leaves_of(&lists, list_cube, target, &entry[e], &cubes[i]);
+			for (uint32_t i = 0; i < n_cubes; i++) {
+				make_room(&lists, target, entry[e].level);
+				list_cube(&lists.words, &lists.cells, target, &entry[e], &cubes[i]);
+			}
 		}
 	}
-	lists.n_inside += lists.words.n;
-	lower_words(target->word, &lists.words);
-	lower_cells(target, &lists.cells);
-	return lists.n_inside;
+	return leaves_end(&lists, target);
 }
 
 #endif
