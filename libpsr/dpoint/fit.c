@@ -93,6 +93,55 @@ static void put(struct bars *bars, const struct bar *bar)
 		bars->is_failed = 1;
 }
 
+/* Whether a convex quadrilateral holds the place u, v. */
+static int is_in(const float corner[4][3], float u, float v)
+{
+	int n_left = 0, n_right = 0;
+
+	for (int c = 0; c < 4; c++) {
+		const float *a = corner[c], *b = corner[(c + 1) % 4];
+		const float side = (b[0] - a[0]) * (v - a[1]) - (b[1] - a[1]) * (u - a[0]);
+
+		n_left += side >= 0;
+		n_right += side <= 0;
+	}
+	return n_left == 4 || n_right == 4;
+}
+
+/* Whether S_p is the surface at u, v: a cell that suits is there. */
+static int is_backed(const struct fitting *f, const struct rectangle *r, float u, float v, size_t i)
+{
+	const struct cell_node *node = &f->look.tree->node[i];
+	float p[3];
+
+	rectangle_sees(p, r, node->middle);
+	if (!(fabsf(p[0] - u) <= node->radius && fabsf(p[1] - v) <= node->radius &&
+	      fabsf(p[2] - dpoint_height_at(r->lambda_u, r->rho, u, v)) <= node->radius + 2 * r->height))
+		return 0;
+	if (cell_node_is_leaf(node)) {
+		const struct dpoint_cell *cell = &f->look.surface->cell[f->look.tree->order[node->begin]];
+		float corner[4][3], middle[3] = { 0, 0, 0 };
+
+		for (int c = 0; c < 4; c++) {
+			rectangle_sees(corner[c], r, cell->corner[c]);
+			v3f_add_scaled(middle, middle, 0.25f, corner[c]);
+		}
+		return is_in((const float (*)[3])corner, u, v) && rectangle_suits(&f->look, r, cell, middle);
+	}
+	return is_backed(f, r, u, v, 2 * i + 1) || is_backed(f, r, u, v, 2 * i + 2);
+}
+
+/* Whether the surface goes on beyond a cell as S_p does: then the cell is of another sheet, which crosses it, or lies
+ * close. Cells of a cloud overlap, so that this would be so of each. */
+static int is_crossing(const struct fitting *f, const struct rectangle *r, const float middle[3], float radius)
+{
+	const float away = sqrtf(middle[0] * middle[0] + middle[1] * middle[1]);
+	const float beyond = away > 0 ? 1 + (radius + f->overhang) / away : 1;
+
+	return !f->look.surface->is_cloud && is_backed(f, r, middle[0], middle[1], 0) &&
+	       is_backed(f, r, middle[0] * beyond, middle[1] * beyond, 0);
+}
+
 /* The surface that goes on beside the rectangle leaves S_p gradually: a cell that S_p runs through, or that is within
  * some heights of it, is of that surface. One that looks back is of another. */
 static void look_at(struct bars *bars, const struct fitting *f, const struct rectangle *r,
@@ -109,7 +158,8 @@ static void look_at(struct bars *bars, const struct fitting *f, const struct rec
 	bar = bar_of((const float (*)[3])corner, above, r->height);
 	if (bar.at[0] + f->overhang >= r->extent[0] || bar.at[1] + f->overhang >= r->extent[1] ||
 	    v3f_dot(cell->normal, r->axis[2]) < -0.5f || rectangle_suits(&f->look, r, cell, middle) ||
-	    fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1])) > 2 * radius + 4 * r->height)
+	    fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1])) > 2 * radius + 4 * r->height ||
+	    is_crossing(f, r, middle, radius))
 		return;
 	for (int k = 0; k < 2; k++)
 		bar.at[k] += f->overhang;

@@ -1,5 +1,6 @@
 #include "sample.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
@@ -24,6 +25,51 @@ static int local_at(struct dpoint_local *local, const struct sampling *s, double
 	return is_good;
 }
 
+static int put_sample(const struct sampling *s, double u, double v, const struct dpoint_candidate *like)
+{
+	struct dpoint_local local;
+	const int is_good = local_at(&local, s, u, v);
+
+	return dpoint_surface_put(s->surface, is_good ? &local : NULL, like);
+}
+
+/* Whether the sample's rectangle is over the corners of its part. */
+static int is_wide_enough(const struct sampling *s, const struct dpoint_candidate *sample, uint32_t i, uint32_t j)
+{
+	const double scale = s->uniform->scale;
+	float extent[2], side[3];
+
+	dpoint_candidate_extent(extent, sample, s->uniform->sine);
+	v3f_cross(side, sample->point.normal, sample->point.u);
+	for (uint32_t k = 0; k < 4; k++) {
+		const double uv[2] = { (double)(i + (k & 1)) / s->uniform->n, (double)(j + (k >> 1)) / s->uniform->n };
+		float away[3];
+		double at[3];
+
+		dpoint_patch_place(at, s->patch, &s->span, uv);
+		for (int c = 0; c < 3; c++)
+			away[c] = (float)((at[c] - s->uniform->origin[c]) * scale) - sample->point.at[c];
+		if (!(fabsf(v3f_dot(away, sample->point.u)) < extent[0] && fabsf(v3f_dot(away, side)) < extent[1]))
+			return 0;
+	}
+	return 1;
+}
+
+static int put_in_cells(const struct sampling *s, uint32_t i, uint32_t j, struct dpoint_candidate *like)
+{
+	const uint32_t n = s->uniform->n, cells = s->uniform->cells, first = like->cell;
+	const double all = (double)n * cells;
+	int rc = PSR_OK;
+
+	for (uint32_t k = 0; k < cells * cells && rc == PSR_OK; k++) {
+		const uint32_t row = i * cells + k / cells, column = j * cells + k % cells;
+
+		like->cell = first + row * n * cells + column;
+		rc = put_sample(s, (row + 0.5) / all, (column + 0.5) / all, like);
+	}
+	return rc;
+}
+
 static int put_candidates(const struct sampling *s)
 {
 	const uint32_t n = s->uniform->n, cells = s->uniform->cells, first = (uint32_t)s->surface->n_cells;
@@ -33,11 +79,15 @@ static int put_candidates(const struct sampling *s)
 
 	for (uint32_t i = 0; i < n && rc == PSR_OK; i++)
 		for (uint32_t j = 0; j < n && rc == PSR_OK; j++) {
-			struct dpoint_local local;
-			int is_good = local_at(&local, s, (i + 0.5) / n, (j + 0.5) / n);
+			const size_t before = s->surface->n_candidates;
 
 			like.cell = first + (i * cells + cells / 2) * n * cells + j * cells + cells / 2;
-			rc = dpoint_surface_put(s->surface, is_good ? &local : NULL, &like);
+			rc = put_sample(s, (i + 0.5) / n, (j + 0.5) / n, &like);
+			if (rc != PSR_OK || s->uniform->sine == 0 || cells == 1 || s->surface->n_candidates == before ||
+			    is_wide_enough(s, &s->surface->candidate[before], i, j))
+				continue;
+			like.cell = first;
+			rc = put_in_cells(s, i, j, &like);
 		}
 	return rc;
 }

@@ -13,6 +13,8 @@ struct dpoint_uniform {
 	float delta;
 	uint32_t part;
 	uint64_t attr; /* of all points, without a normal */
+	float sine;    /* of epsilon: where the rectangle of a sample is not over all of its part, each of the part's cells gets
+	                * a sample of its own; 0: none does */
 };
 int dpoint_sample_uniform(struct dpoint_surface *surface, const struct dpoint_patch *patch,
                           const struct dpoint_uniform *uniform);

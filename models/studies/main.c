@@ -72,6 +72,18 @@
 	"David 10            4.40   2.60    1.30   1.50   7.40   3.0     1.2\n" \
 	"Tree 10             5.70   3.60    2.90   1.50   5.40   1.7     1.0"
 
+/* Of [K], table 1: a processor of 866 MHz and a GeForce 2. */
+#define NOTE_DPOINT_MODELS \
+	"The teapot is its 32 patches, others are meshes. s: until points are chosen. Frames a second of 800x600; dB: to the\n" \
+	"ray-traced source, inside the object, specular. Holes and leaks are pixels.\n\n" \
+	"[K]                      points     kB      s  diffuse  specular\n" \
+	"teapot, all              156800   9190   22.5      2.1       2.0\n" \
+	"teapot, simplified        25713   1510  146.5     12.5      11.8\n" \
+	"human head, all          376400  22060   22.2      0.9       0.9\n" \
+	"human head, simplified    64042   3750  485.5      5.3       5.1\n" \
+	"camera, all              216712  12690   15.3      1.6       1.5\n" \
+	"camera, simplified        46077   2700  178.2      6.9       6.7"
+
 static const struct study_kind tables[] = {
 	{ "tolerance", "figure 5.5", "tolerance angle, equilateral lattice", table_tolerance, FIVE, NULL,
 	  PLOT_SIZE_TIME("tolerance angle, degrees", "") },
@@ -95,6 +107,8 @@ static const struct study_kind tables[] = {
 	  "Pictures of 800x600 with one light, roughness 0.25. A size is how many pixels of the picture are one that the\n"
 	  "models are for. kB: in memory. dB: to the ray-traced source, inside the object; bright: of its bright pixels.\n"
 	  "Holes are pixels; leaks, and blocks' holes and leaks, are a million pixels'.", NULL },
+	{ "dpoint-models", "[K] table 1", "differential points: three models", table_dpoint_models, "teapot,gavel",
+	  NOTE_DPOINT_MODELS, NULL },
 	{ "dpoint-meshes", "[K] 4.1", "differential points of meshes", table_dpoint_meshes, "top,teapot,toybird,gavel",
 	  "Rectangles are fitted to 4 degrees and 0.002 radii; pieces: of triangles, no longer than 0.02 radii;\n"
 	  "bad: corners without a curvature, and pieces without a normal. No place is left uncovered.", NULL },
@@ -128,6 +142,8 @@ static const struct study_kind figures[] = {
 	  .run = figure_octree_levels, .models = "dragon" },
 	{ .name = "octree-parts", .figure = "[B] figure 13", .what = "parts of packed octrees, as pictures",
 	  .run = figure_octree_parts, .models = "dragon" },
+	{ .name = "dpoint-splats", .figure = "[K] table 2, figure 6", .what = "differential points beside splats",
+	  .run = figure_dpoint_splats },
 	{ .name = "zoom", "section 9.1", "a zoom: error and popping, frame by frame", figure_zoom, .plot = figure_zoom_plot },
 };
 #define N_TABLES (sizeof tables / sizeof *tables)

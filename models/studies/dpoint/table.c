@@ -4,19 +4,9 @@
 #include <string.h>
 #include "base/clock.h"
 #include "dpoint/group.h"
-#include "dpoint/sample.h"
 #include "models/shapes/teapot.h"
 #include "models/studies/tables/tables.h"
 #include "study_dpoint.h"
-
-#define EPSILON 0.004
-#define SLACK 2e-5f    /* half a step of a group's box of 0.6 */
-#define OVERHANG 5e-4f
-
-/* [K] does not say its epsilon and delta. These are the least epsilon, of two digits, whose rectangles leave less than
- * a thousandth of the patches uncovered, and the delta at which [K]'s order keeps as much as [K] does, 16.4 %. */
-#define DELTA_THERE 0.0127f
-#define DELTA_FREE 0.1f
 
 enum { POINTS, KEPT, BYTES, SECONDS, NORMAL_RMS, NORMAL_WORST, HEIGHT_WORST, OVERLAP, HOLES, N_COLUMNS };
 
@@ -38,35 +28,23 @@ struct row {
 };
 
 static const struct row rows[] = {
-	{ "all points, 62 bytes", ALL, DELTA_THERE, 170, 1, 1, 62, 70, 2, 1 },
-	{ "[K] 4.2, within patches", THEIRS, DELTA_THERE, 170, 1, 1, 62, 70, 2, 1 },
-	{ "front, across", OURS, DELTA_THERE, 170, 1, 0, 16, 70, 2, 1 },
-	{ "fitted, 2 degrees", FITTED, DELTA_FREE, 2, 0.002f, 0, 16, 70, 2, 1 },
-	{ "the same in two turns", FITTED, DELTA_FREE, 2, 0.002f, 0, 16, 70, 2, 6 },
-	{ "fitted, 4 degrees", FITTED, DELTA_FREE, 4, 0.002f, 0, 16, 70, 2, 1 },
-	{ "380,192: 2 degrees, two turns", FITTED, DELTA_FREE, 2, 0.002f, 0, 16, 109, 1, 12 },
+	{ "all points, 62 bytes", ALL, STUDY_DPOINT_DELTA, 170, 1, 1, 62, 70, 2, 1 },
+	{ "[K] 4.2, within patches", THEIRS, STUDY_DPOINT_DELTA, 170, 1, 1, 62, 70, 2, 1 },
+	{ "front, across", OURS, STUDY_DPOINT_DELTA, 170, 1, 0, 16, 70, 2, 1 },
+	{ "fitted, 2 degrees", FITTED, STUDY_DPOINT_DELTA_FREE, 2, 0.002f, 0, 16, 70, 2, 1 },
+	{ "the same in two turns", FITTED, STUDY_DPOINT_DELTA_FREE, 2, 0.002f, 0, 16, 70, 2, 6 },
+	{ "fitted, 4 degrees", FITTED, STUDY_DPOINT_DELTA_FREE, 4, 0.002f, 0, 16, 70, 2, 1 },
+	{ "380,192: 2 degrees, two turns", FITTED, STUDY_DPOINT_DELTA_FREE, 2, 0.002f, 0, 16, 109, 1, 12 },
 };
 #define N_ROWS (int)(sizeof rows / sizeof *rows)
 
 static int sample_teapot(struct dpoint_surface *surface, const struct row *row)
 {
-	static const double bezier[8] = { 0, 0, 0, 0, 1, 1, 1, 1 };
-	struct dpoint_uniform uniform = { row->side, row->cells, { 0.2, 1.575, 0 }, 1 / 3.75, row->delta, 0, 0 };
-	int rc = PSR_OK;
+	const struct dpoint_uniform uniform = { row->side, row->cells, STUDY_DPOINT_ORIGIN, 1 / STUDY_DPOINT_RADIUS,
+		                                    .delta = row->delta,
+		                                    .sine = row->way == FITTED ? dpoint_sine(STUDY_DPOINT_EPSILON) : 0 };
 
-	for (uint32_t i = 0; i < TEAPOT_PATCHES && rc == PSR_OK; i++) {
-		double place[4][4][3], control[16][4];
-		const struct dpoint_patch patch = { { 3, 3 }, { 4, 4 }, { bezier, bezier }, (const double (*)[4])control };
-
-		teapot_patch(i, place);
-		for (int k = 0; k < 16; k++) {
-			memcpy(control[k], place[k / 4][k % 4], sizeof place[0][0]);
-			control[k][3] = 1;
-		}
-		uniform.part = i;
-		rc = dpoint_sample_uniform(surface, &patch, &uniform);
-	}
-	return rc;
+	return study_dpoint_teapot(surface, &uniform);
 }
 
 static int keep_all(struct dpoint_choice *choice, const struct dpoint_cover *cover)
@@ -108,10 +86,7 @@ static void put(double value[N_COLUMNS], const struct row *row, const struct dpo
 
 static int measure(double value[N_COLUMNS], const struct row *row, struct study *study)
 {
-	const struct dpoint_cover_options options = {
-		.sine = dpoint_sine(EPSILON), .slack = SLACK, .angle = (float)(row->degrees * PSR_DEGREE), .height = row->height,
-		.is_within_parts = row->is_within_parts, .overhang = OVERHANG,
-	};
+	struct dpoint_cover_options options = STUDY_DPOINT_FITTED(row->degrees, row->height);
 	struct dpoint_surface surface;
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
@@ -120,6 +95,7 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 	double start = clock_seconds();
 	int rc;
 
+	options.is_within_parts = row->is_within_parts;
 	dpoint_surface_init(&surface);
 	rc = sample_teapot(&surface, row);
 	if (rc == PSR_OK && row->way == FITTED)

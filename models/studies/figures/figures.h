@@ -165,6 +165,7 @@ int figure_edges(struct study *study);
 int figure_interfaces(struct study *study);
 int figure_thin(struct study *study);
 int figure_stills(struct study *study);
+int figure_dpoint_splats(struct study *study);
 int figure_zoom(struct study *study);
 extern const char figure_zoom_plot[];
 /* Of the first model of study->names. */

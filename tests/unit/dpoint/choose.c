@@ -14,7 +14,7 @@
 
 static void sample(struct dpoint_surface *surface, const struct dpoint_patch *patch, uint32_t n, float delta)
 {
-	const struct dpoint_uniform uniform = { n, 2, { 0, 0, 0 }, 1, delta, 7, 0 };
+	const struct dpoint_uniform uniform = { n, 2, { 0, 0, 0 }, 1, delta, 7, 0, 0 };
 
 	dpoint_surface_init(surface);
 	assert_int_equal(dpoint_sample_uniform(surface, patch, &uniform), PSR_OK);

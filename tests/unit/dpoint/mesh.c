@@ -178,7 +178,7 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 	struct dpoint_surface surface;
 	struct revolved torus;
 	size_t n = 0;
-	const struct dpoint_uniform uniform = { 10, 2, { 0, 0, 0 }, 1, 0.5f, 0, 0 };
+	const struct dpoint_uniform uniform = { 10, 2, { 0, 0, 0 }, 1, 0.5f, 0, 0, 0 };
 
 	(void)state;
 	revolve(&torus, 1, 0.4, 0, 9);
@@ -221,7 +221,7 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 static void two_turns_cover_all_with_little_more(void **state)
 {
 	const struct dpoint_cover_options options = { dpoint_sine(0.03), 1e-5f, 0.06f, 0.01f, 0, OVERHANG, 0, 0 };
-	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0, 0 };
+	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0, 0, 0 };
 	struct revolved torus;
 	size_t n_kept[2];
 
