@@ -12,7 +12,8 @@ fetched=${XDG_CACHE_HOME:-$HOME/.cache}/psr/models
 scans=$(ls "$fetched/dragon.ply" "$fetched/armadillo.off" "$fetched/bunny.obj" 2>/dev/null | tr '\n' ,)
 
 [ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-offsets \
-	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats dpoint
+	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats dpoint \
+	dpoint-models dpoint-splats dpoint-frames dpoint-error
 for study; do
 	echo "study $study" >&2
 	plot=()
@@ -22,6 +23,12 @@ for study; do
 	octree) models=(-r 512 --models "${scans}pinetree,terrain,scan:terrain") ;;
 	octree-prefixes) models=(-r 512 --models "${scans}pinetree,scan:terrain") ;;
 	octree-splats) models=(--models "${scans}teapot") ;;
+	dpoint-models)
+		[ -f "$fetched/lionhead.off" ] && [ -f "$fetched/fandisk.off" ] ||
+			{ echo "lionhead.off and fandisk.off are not here: make models fetches them" >&2; continue; }
+		models=(--models "teapot,$fetched/lionhead.off,$fetched/fandisk.off")
+		;;
+	dpoint-splats) models=(--out docs/studies) ;;
 	octree-rates) # beside another renderer
 		[ -f "$fetched/dragon.ply" ] || { echo "dragon.ply is not here: make models fetches it" >&2; continue; }
 		"$rates" -o docs/studies/octree-rates.png "$fetched/dragon.ply" >"$work/table"
