@@ -24,6 +24,7 @@
 #include "progress.h"
 
 #define PROGRAM "psr-model build"
+#define MOST_FACETS 8192    /* the finest resolution that exact surfaces are cut into triangles for */
 #define CALIBRATION_SEED 31 /* views that evaluations have are others */
 #define FORMATS \
 	"IN is told by its first bytes and its ending:\n" \
@@ -371,6 +372,10 @@ int cmd_build(int argc, char **argv)
 	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
 	wish.import.crease = crease * PSR_DEGREE;
 	wish.import.resolution = (uint32_t)resolution;
+	wish.import.has_patches = wish.is_points;
+	/* An error is told from triangles: those of exact surfaces are off by a quarter of it at most. */
+	if (wish.points.error > 0 && wish.points.error < 0.5)
+		wish.import.resolution = (uint32_t)fmin(ceil((double)resolution * 0.5 / wish.points.error), MOST_FACETS);
 	wish.import.is_preview = resolution <= PSR_PREVIEW_RESOLUTION;
 	wish.octree.resolution = (uint32_t)resolution;
 	wish.octree.memory = (uint64_t)memory;

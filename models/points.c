@@ -60,11 +60,12 @@ int points_check(const struct points_wish *wish, int is_points, struct psr_error
 void points_summarize(const struct dpoint_build_report *report, const char *out, uint64_t file_bytes,
                       const struct psr_mesh *mesh)
 {
-	const uint32_t n = mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points;
+	const uint32_t n = mesh->n_patches > 0 ? mesh->n_patches : mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points;
 
 	printf("%s: %" PRIu64 " differential points of %" PRIu64 ", %.2f MB, from %" PRIu32 " %s in %.1f s; normals"
 	       " within %.1f degrees, all within %.3g pixels of the surface\n", out, report->n_kept, report->n_candidates,
-	       (double)file_bytes / 1e6, n, mesh->n_triangles > 0 ? "triangles" : "points of a cloud", report->seconds,
+	       (double)file_bytes / 1e6, n,
+	       mesh->n_patches > 0 ? "NURBS patches" : mesh->n_triangles > 0 ? "triangles" : "points of a cloud", report->seconds,
 	       report->normal_worst / PSR_DEGREE, report->off_worst);
 }
 

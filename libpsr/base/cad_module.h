@@ -5,12 +5,16 @@
 
 #include <stdint.h>
 #include "psr/error.h"
+#include "psr/mesh.h"
 
 struct cad_module_source {
 	const char *path;
 	int is_iges;            /* else STEP */
 	double deflection;      /* triangles are off the surface by so much at most, as a part of the longest side */
 	double angle;           /* and surface normals turn by so much along a side, radians; both > 0 */
+	double rim;             /* above 0: faces come as patches, too, and sides of triangles along edges of faces are off the
+	                         * edge by so much at most, likewise as a part of the longest side */
+	int most_degree;        /* of patches */
 	uint64_t max_triangles;
 };
 
@@ -24,6 +28,10 @@ struct cad_module_mesh {
 	uint32_t *color_of;      /* n_triangles, < n_colors */
 	float (*color)[4];       /* linear; alpha -1: the file has none for these faces */
 	uint32_t n_faces, n_left_out; /* faces of the file; those that could not be cut into triangles */
+	uint32_t n_patches;
+	struct psr_patch *patch; /* n_patches; what they point at is from malloc(); material: < n_colors */
+	uint32_t *patch_of;      /* n_triangles: of the triangle's face, or UINT32_MAX; NULL: there are no patches */
+	uint32_t n_unlike;       /* faces with triangles, whose surface no such patch is: they have none */
 	uint32_t n_open;         /* solids and shells whose faces do not close, by the file's own tolerances */
 	char first_left_out[128]; /* the first one's number, and its part's name; printable */
 };
@@ -35,7 +43,7 @@ typedef int cad_module_read(struct cad_module_mesh **out, const struct cad_modul
 typedef void cad_module_destroy(struct cad_module_mesh *mesh); /* NULL is fine */
 
 /* The module exports one of these, named psr_cad_module. Raise the version with every change of this file. */
-#define CAD_MODULE_VERSION 1
+#define CAD_MODULE_VERSION 2
 struct cad_module {
 	uint32_t version; /* CAD_MODULE_VERSION of the module's own build; first in every version */
 	cad_module_read *read;

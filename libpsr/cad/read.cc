@@ -36,21 +36,23 @@
 #include <XCAFDoc_ShapeTool.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
-#include "triangles.h"
+#include "patches.h"
 
 namespace {
 
 constexpr int MOST_DEPTH = 64;          // of assemblies
 constexpr size_t MOST_COLORS = 65000;
+constexpr double ALIKE = 1e-6;          // of the longest side: how far a NURBS may be from the surface that it stands for
 
 struct walk {
 	Handle(XCAFDoc_ShapeTool) shapes;
 	Handle(XCAFDoc_ColorTool) colors;
 	cad_triangles triangles;
+	cad_patches patches;
 	std::vector<std::array<float, 4>> color;
 	std::map<std::array<float, 4>, uint32_t> number_of;
 	const cad_module_source *source;
-	double deflection;
+	double longest_side;
 	uint32_t n_faces = 0, n_left_out = 0, n_open = 0;
 	std::string first_left_out;
 	TopTools_DataMapOfShapeInteger entity_color; // of faces without places; see take_entity_colors()
@@ -94,6 +96,17 @@ std::string name_of(const TDF_Label &label)
 	return text;
 }
 
+// Sides along edges are finer than the faces between them, if patches are to end there.
+void cut(const TopoDS_Shape &shape, const cad_module_source &source, double longest_side)
+{
+	IMeshTools_Parameters how;
+	how.Angle = how.AngleInterior = source.angle;
+	how.Deflection = how.DeflectionInterior = source.deflection * longest_side;
+	if (source.rim > 0)
+		how.Deflection = std::min(source.rim, source.deflection) * longest_side;
+	BRepMesh_IncrementalMesh(shape, how);
+}
+
 void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_t inherited)
 {
 	const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(label);
@@ -101,7 +114,7 @@ void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_
 	TDF_LabelSequence parts;
 	if (shape.IsNull())
 		return;
-	BRepMesh_IncrementalMesh(shape, deflection, Standard_False, source->angle, Standard_False);
+	cut(shape, *source, longest_side);
 	XCAFDoc_ShapeTool::GetSubShapes(label, parts);
 	for (const bool is_face : { false, true })
 		for (TDF_LabelSequence::Iterator it(parts); it.More(); it.Next()) {
@@ -118,10 +131,15 @@ void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_
 		const int *c = own.Seek(it.Current());
 		if (c == nullptr)
 			c = entity_color.Seek(it.Current().Located(TopLoc_Location()));
+		const TopoDS_Face face = TopoDS::Face(it.Current().Moved(location));
+		const size_t first_triangle = triangles.triangle.size(), first_vertex = triangles.vertex.size();
+		const uint32_t number = c != nullptr ? static_cast<uint32_t>(*c) : inherited;
 		n_faces++;
-		if (triangles.add(TopoDS::Face(it.Current().Moved(location)),
-		                  c != nullptr ? static_cast<uint32_t>(*c) : inherited))
+		if (triangles.add(face, number)) {
+			if (source->rim > 0)
+				patches.add(triangles, face, number, first_triangle, first_vertex);
 			continue;
+		}
 		if (n_left_out++ == 0)
 			first_left_out = std::to_string(n_faces) + " of part \"" + name_of(label) + "\"";
 	}
@@ -209,6 +227,22 @@ template <typename To, typename From> To *copy(const std::vector<From> &from)
 	return static_cast<To *>(block);
 }
 
+void hand_over(psr_patch *out, const cad_patch &p)
+{
+	for (int k = 0; k < 2; k++) {
+		out->degree[k] = p.degree[k];
+		out->n[k] = p.n[k];
+		out->knot[k] = copy<double>(p.knot[k]);
+	}
+	out->control = copy<double[4]>(p.control);
+	out->corner = copy<double[2]>(p.corner);
+	out->triangle = copy<uint32_t[3]>(p.triangle);
+	out->rim = copy<uint8_t>(p.rim);
+	out->n_corners = static_cast<uint32_t>(p.corner.size());
+	out->n_triangles = static_cast<uint32_t>(p.triangle.size());
+	out->material = p.color;
+}
+
 void hand_over(cad_module_mesh *out, const walk &w)
 {
 	const cad_triangles &t = w.triangles;
@@ -226,6 +260,16 @@ void hand_over(cad_module_mesh *out, const walk &w)
 	out->n_vertices = static_cast<uint32_t>(t.vertex.size());
 	out->n_triangles = static_cast<uint32_t>(t.triangle.size());
 	out->n_colors = static_cast<uint32_t>(w.color.size());
+	if (w.patches.patch.size() > 0) {
+		out->patch = static_cast<psr_patch *>(std::calloc(w.patches.patch.size(), sizeof *out->patch));
+		if (out->patch == nullptr)
+			throw std::bad_alloc();
+		out->n_patches = static_cast<uint32_t>(w.patches.patch.size());
+		for (uint32_t i = 0; i < out->n_patches; i++)
+			hand_over(&out->patch[i], w.patches.patch[i]);
+		out->patch_of = copy<uint32_t>(w.patches.patch_of);
+	}
+	out->n_unlike = w.patches.n_unlike;
 	out->n_faces = w.n_faces;
 	out->n_left_out = w.n_left_out;
 	out->n_open = w.n_open;
@@ -261,13 +305,16 @@ void read(cad_module_mesh *out, const cad_module_source *source)
 	w.colors = XCAFDoc_DocumentTool::ColorTool(opened.document->Main());
 	w.shapes->GetFreeShapes(roots);
 	w.source = source;
-	w.deflection = source->deflection * longest_side(roots);
-	if (!(w.deflection > 0))
+	w.longest_side = longest_side(roots);
+	if (!(w.longest_side > 0))
 		throw cad_failure(PSR_ERR_FORMAT, "all of it is one point");
 	w.triangles.max_triangles = source->max_triangles;
+	w.patches.most_degree = source->most_degree;
+	w.patches.tolerance = ALIKE * w.longest_side;
 	for (TDF_LabelSequence::Iterator it(roots); it.More(); it.Next())
 		w.visit(it.Value(), TopLoc_Location(), 0, 0);
 	w.triangles.join();
+	w.patches.find_ends(w.triangles);
 	hand_over(out, w);
 }
 
@@ -291,6 +338,16 @@ extern "C" void cad_destroy(cad_module_mesh *mesh)
 	std::free(mesh->triangle);
 	std::free(mesh->color_of);
 	std::free(mesh->color);
+	for (uint32_t i = 0; i < mesh->n_patches; i++) {
+		std::free(mesh->patch[i].knot[0]);
+		std::free(mesh->patch[i].knot[1]);
+		std::free(mesh->patch[i].control);
+		std::free(mesh->patch[i].corner);
+		std::free(mesh->patch[i].triangle);
+		std::free(mesh->patch[i].rim);
+	}
+	std::free(mesh->patch);
+	std::free(mesh->patch_of);
 	std::free(mesh);
 }
 

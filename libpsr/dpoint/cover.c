@@ -59,6 +59,13 @@ size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate)
 	return n;
 }
 
+static void keep_margin(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options)
+{
+	for (int k = 0; k < 2; k++)
+		if (r->extent[k] < c->delta[k] || c->delta[k] >= options->delta)
+			r->extent[k] *= 1 - options->margin;
+}
+
 static void look(int chunk, void *userdata)
 {
 	struct covering *covering = userdata;
@@ -74,6 +81,8 @@ static void look(int chunk, void *userdata)
 		const size_t before = found.n;
 
 		rectangle_of(&r, &l->surface->candidate[i], l->options);
+		if (l->options->margin > 0)
+			keep_margin(&r, &l->surface->candidate[i], l->options);
 		rectangle_shorten(&r, l->options->slack);
 		if (r.extent[0] > 0 && r.extent[1] > 0)
 			search(&found, l, &r, 0);

@@ -59,6 +59,12 @@ static int refuse_pieces(const struct dpoint_mesh_options *options, struct psr_e
 	                is_bounded(options) ? ", a greater error" : "");
 }
 
+/* A triangle of a patch is no more than a facet: dpoint_sample_trimmed() has its pieces. */
+static int is_of_patch(const struct psr_mesh *mesh, uint32_t t)
+{
+	return mesh->triangle_patch != NULL && mesh->triangle_patch[t] != UINT32_MAX;
+}
+
 /* Before anything is cut: what is too much is told at once. */
 static int check(const struct corners *corners, const struct psr_mesh *mesh, const struct dpoint_mesh_options *options,
                  struct psr_error *err)
@@ -67,6 +73,8 @@ static int check(const struct corners *corners, const struct psr_mesh *mesh, con
 	uint64_t n_pieces = 0, n_grains = 0;
 
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
+		if (is_of_patch(mesh, t))
+			continue;
 		look_at(&c, corners, mesh, t);
 		if (cut_plan(&c, 0) > CUT_MOST_PARTS)
 			return psr_fail(err, PSR_ERR_LIMIT, "triangle %u has a side of more than %d pieces of %g; use a lower resolution,"
@@ -137,6 +145,8 @@ static int put_cells(struct cutting *c, const struct corners *corners, const str
 	int rc = PSR_OK;
 
 	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
+		if (is_of_patch(mesh, t))
+			continue;
 		look_at(c, corners, mesh, t);
 		cut_plan(c, corners->is_open[t]);
 		rc = cut(c);

@@ -24,9 +24,10 @@ struct dpoint_mesh_options {
 /* Adds facets, those of triangles, or of the cells that are there where a material has alpha; and a candidate and a
  * cell for each piece of a triangle, with the shape of its corners' curvatures between them.
  * Corners that share place and normal are one: so creases, where a mesh has several normals at a place or none, and
- * borders part the surface, and a strip beyond them keeps rectangles from reaching over. Parts are materials. Corners
- * without curvatures (of slivers) count as bad, and flat. MEMORY; LIMIT: more than 2^22 pieces, 2^27 looks, or 4096
- * pieces along a side; of these only pieces that colours or an error ask for are counted late, as they come. */
+ * borders part the surface, and a strip beyond them keeps rectangles from reaching over. Parts are materials.
+ * Triangles of patches are facets alone: dpoint_sample_trimmed() has their pieces. Corners without curvatures (of
+ * slivers) count as bad, and flat. MEMORY; LIMIT: more than 2^22 pieces, 2^27 looks, or 4096 pieces along a side; of
+ * these only pieces that colours or an error ask for are counted late, as they come. */
 int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *mesh,
                        const struct dpoint_mesh_options *options, struct psr_error *err);
 

@@ -42,6 +42,7 @@ struct dpoint_surface {
 	size_t n_cells, n_candidates, cells_room, candidates_room;
 	uint64_t n_bad, n_clamped;  /* candidates that were left out; whose curvature was brought to the bound */
 	struct facets facets;       /* of a mesh or a cloud; of other sources there are none */
+	float margin;               /* of its cover's options */
 	int is_cloud;               /* cells are as far apart as samples are: what mends one keeps its curvatures */
 };
 
@@ -74,6 +75,9 @@ struct dpoint_cover_options {
 	int looks;         /* a cell may differ from the point by so many 255ths of a channel (look.h), 0..255 */
 	float error;       /* above 0: dpoint_fit() and dpoint_mend() keep the quadric over the rectangle within this distance
 	                    * of the surface's facets, as bound.h proves it, before places are packed */
+	/* Rectangles cover less than they are by this part of an extent where nothing ended it: by epsilon, or at `delta`. So
+	 * neighbours overlap, and what words tilt them by is no gap from aslant. */
+	float margin, delta;
 };
 
 /* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along

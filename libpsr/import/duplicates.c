@@ -51,8 +51,7 @@ int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, str
 		if (slot[at] != EMPTY)
 			continue;
 		slot[at] = kept;
-		memmove(mesh->triangle[kept], mesh->triangle[t], sizeof mesh->triangle[t]);
-		mesh->triangle_material[kept++] = mesh->triangle_material[t];
+		import_mesh_move_triangle(mesh, kept++, t);
 	}
 	*n_dropped = mesh->n_triangles - kept;
 	mesh->n_triangles = kept;

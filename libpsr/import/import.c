@@ -22,6 +22,7 @@ void psr_import_options_default(struct psr_import_options *options)
 	options->n_threads = psr_pool_all_cores();
 	options->is_preview = 0;
 	options->resolution = DEFAULT_RESOLUTION;
+	options->has_patches = 0;
 }
 
 static int check_options(const struct psr_import_options *options, struct psr_error *err)

@@ -104,6 +104,13 @@ int import_mesh_check_indices(const struct import_mesh *im, struct psr_error *er
 /* Drops vertices that no triangle uses. Indices must be in range. MEMORY. */
 int import_mesh_drop_vertices(struct import_mesh *im, struct psr_error *err);
 
+/* patches.c: */
+/* Moves a triangle, with all that it has, to a place before its own, or to its own. */
+void import_mesh_move_triangle(struct psr_mesh *mesh, uint32_t to, uint32_t from);
+/* Checks the promises of psr/mesh.h but for overlaps. FORMAT. */
+int import_patch_check(const struct psr_patch *patch, uint32_t n_materials, struct psr_error *err);
+void import_patches_destroy(struct psr_patch *patch, uint32_t n); /* NULL is fine */
+
 /* duplicates.c: drops each triangle with the positions, winding and material of an earlier one; *n_dropped: how many.
  * Indices must be in range. MEMORY. */
 int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, struct psr_error *err);

@@ -183,8 +183,7 @@ static void drop_triangles(const struct grid *grid, struct psr_mesh *mesh)
 
 		if (moves && !keeps_side(grid, mesh, v))
 			continue;
-		memmove(mesh->triangle[kept], mesh->triangle[t], sizeof mesh->triangle[t]);
-		mesh->triangle_material[kept++] = mesh->triangle_material[t];
+		import_mesh_move_triangle(mesh, kept++, t);
 	}
 	mesh->n_triangles = kept;
 }

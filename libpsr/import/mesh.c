@@ -20,6 +20,8 @@ void psr_mesh_destroy(struct psr_mesh *mesh)
 	free(mesh->color);
 	free(mesh->triangle);
 	free(mesh->triangle_material);
+	import_patches_destroy(mesh->patch, mesh->n_patches);
+	free(mesh->triangle_patch);
 	free(mesh->point);
 	free(mesh->point_normal);
 	free(mesh->point_radius);

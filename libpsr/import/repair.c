@@ -60,8 +60,7 @@ static void drop_triangles(struct import_mesh *im)
 		} else if (!has_area(a, b, c)) {
 			n_flat++;
 		} else {
-			memmove(mesh->triangle[kept], mesh->triangle[t], sizeof mesh->triangle[t]);
-			mesh->triangle_material[kept++] = mesh->triangle_material[t];
+			import_mesh_move_triangle(mesh, kept++, t);
 		}
 	}
 	mesh->n_triangles = kept;

@@ -71,6 +71,39 @@ done
 check "a wire beside it is kept" said build_cloud "$work/wire.xyz"
 check "and counted" grep -q '51 points of the cloud have too few neighbours' "$work/said"
 
+# STEP: faces as they are, within their rims; a face whose border is open is left out, and the rest is there.
+pins=tests/data/import/pins.step
+build_part() { psr-model build "$1" --representation dpoints -r 256 -o "$work/part.psr" "${@:2}" >"$work/told" 2>"$work/said"; }
+if [ -r "$BUILD/lib/psr-cad-occ.so" ]; then
+	check "a part becomes differential points" build_part "$pins"
+	check "of its patches" grep -q 'from 6 NURBS patches' "$work/told"
+	for view in "20 30 1" "200 -40 1" "100 5 4" "-60 70 12"; do
+		read -r azimuth elevation zoom <<<"$view"
+		psr shot "$work/part.psr" --size 300x300 --no-smooth --codec lossless --ambient 1 --azimuth "$azimuth" \
+			--elevation "$elevation" --zoom "$zoom" --target 0,0,20 -o "$work/part.ppm" --depth "$work/part.pfm" --report "$work/shot.json"
+		check "its picture has no hole: $view" psr-model accuracy "$pins" --depth "$work/part.pfm" --report "$work/shot.json" \
+			--max-holes 0
+	done
+	kept=$(points part)
+	check "with an error" build_part "$pins" --error 0.5
+	off=$(psr-model info "$work/part.psr" --json >"$work/part.json" && number "$work/part.json" height_pixels)
+	check "that holds: $off pixels" awk "BEGIN { exit !($off > 0 && $off <= 0.50001) }"
+	sed 's/(#42,#76,#99,#126)/(#42,#76,#126)/' "$pins" >"$work/open.step"
+	check "a border that is open leaves its face out" build_part "$work/open.step"
+	check "and tells so" grep -q '2 of 6 faces could not be cut into triangles and were left out, first face 1 of part "pin"' "$work/said"
+	check "the others are there" grep -q 'from 4 NURBS patches' "$work/told"
+	sed 's/(50.,0.,0.)/(nan,1.E308,0.)/' "$pins" >"$work/nowhere.step"
+	check "a part that is nowhere leaves the other there" build_part "$work/nowhere.step"
+	check "and tells so, too" grep -q '3 of 6 faces have no NURBS of their own' "$work/said"
+	check "of patches" grep -q 'from 3 NURBS patches' "$work/told"
+	head -c 4000 "$pins" >"$work/cut.step"
+	refuses "a part that ends in the middle" 4 "the STEP file ends in the middle" psr-model build "$work/cut.step" \
+		--representation dpoints -r 256 -o "$work/none.psr"
+	check "as blocks it has no patches" psr-model build "$pins" -r 64 -o "$work/blocks.psr" -q
+else
+	skip "differential points of STEP" "a build without Open CASCADE"
+fi
+
 # Sheer are surfaces of BLEND materials; the coverage of things narrower than a sample is none.
 psr-model make pencil -o "$work/pencil.glb" >/dev/null
 psr-model build "$work/pencil.glb" -r 64 -o "$work/pencil.psr" >/dev/null 2>"$work/said"

@@ -1,11 +1,16 @@
 #define _GNU_SOURCE
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "base/cad_module.h"
+#include "dpoint/patch.h"
 #include "import/import.h"
 
 #define PER_PIXEL 8       /* triangles are off by this part of a pixel of the model */
 #define ANGLE 0.2         /* radians: colours and highlights between corners stay smooth */
+/* Faces that meet end at straight sides of their own between the same places. What differential points cover beyond such
+ * a side (dpoint/trimmed.h) is twice as wide. */
+#define RIM 2.5e-5
 #define HEAD 4096
 #define TAIL 65536        /* of a file; its end is in there */
 #define CARD 80           /* bytes of a line of IGES */
@@ -115,7 +120,42 @@ static int add_materials(struct import_mesh *im, const struct cad_module_mesh *c
 	return PSR_OK;
 }
 
-static int take(struct import_mesh *im, const struct cad_module_mesh *cad, struct psr_error *err)
+/* Takes patches over. Those that break a promise stay behind: then their triangles stand for them. */
+static int take_patches(struct import_mesh *im, struct cad_module_mesh *cad, uint32_t first, struct psr_error *err)
+{
+	struct psr_mesh *mesh = im->mesh;
+	uint32_t *number, n_triangle_faces = cad->n_unlike;
+
+	if (cad->n_patches == 0)
+		return PSR_OK;
+	number = malloc(cad->n_patches * sizeof *number);
+	mesh->patch = malloc(cad->n_patches * sizeof *mesh->patch);
+	mesh->triangle_patch = malloc(cad->n_triangles * sizeof *mesh->triangle_patch);
+	if (number == NULL || mesh->patch == NULL || mesh->triangle_patch == NULL) {
+		free(number);
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %u NURBS patches", im->path, cad->n_patches);
+	}
+	for (uint32_t i = 0; i < cad->n_patches; i++) {
+		number[i] = UINT32_MAX;
+		if (import_patch_check(&cad->patch[i], cad->n_colors, NULL) != PSR_OK) {
+			n_triangle_faces++;
+			continue;
+		}
+		number[i] = mesh->n_patches;
+		mesh->patch[mesh->n_patches] = cad->patch[i];
+		mesh->patch[mesh->n_patches++].material += first;
+		memset(&cad->patch[i], 0, sizeof cad->patch[i]);
+	}
+	for (uint32_t t = 0; t < cad->n_triangles; t++)
+		mesh->triangle_patch[t] = cad->patch_of[t] < cad->n_patches ? number[cad->patch_of[t]] : UINT32_MAX;
+	if (n_triangle_faces > 0)
+		import_mesh_warn(im, "%u of %u faces have no NURBS of their own, and are as their triangles", n_triangle_faces,
+		                 cad->n_faces);
+	free(number);
+	return PSR_OK;
+}
+
+static int take(struct import_mesh *im, struct cad_module_mesh *cad, struct psr_error *err)
 {
 	const uint32_t first = im->mesh->n_materials;
 	struct psr_mesh *mesh = im->mesh;
@@ -133,6 +173,9 @@ static int take(struct import_mesh *im, const struct cad_module_mesh *cad, struc
 	if (cad->n_left_out > 0)
 		import_mesh_warn(im, "%u of %u faces could not be cut into triangles and were left out, first face %s",
 		                 cad->n_left_out, cad->n_faces, cad->first_left_out);
+	rc = take_patches(im, cad, first, err);
+	if (rc != PSR_OK)
+		return rc;
 	if (cad->n_open > 0)
 		import_mesh_warn(im, "%u shells are open: their faces do not meet all around", cad->n_open);
 	rc = import_mesh_merge(im, err);
@@ -142,8 +185,10 @@ static int take(struct import_mesh *im, const struct cad_module_mesh *cad, struc
 int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 {
 	const struct cad_module_source source = {
-		im->path, !is_step(im->path, bytes, n_bytes), 1.0 / (PER_PIXEL * (double)im->options.resolution), ANGLE,
-		IMPORT_MAX_TRIANGLES / 4,
+		.path = im->path, .is_iges = !is_step(im->path, bytes, n_bytes), .angle = ANGLE,
+		.deflection = 1.0 / (PER_PIXEL * (double)im->options.resolution),
+		.rim = im->options.has_patches && !im->options.is_preview ? RIM : 0, .most_degree = DPOINT_MOST_DEGREE,
+		.max_triangles = IMPORT_MAX_TRIANGLES / 4,
 	};
 	const struct cad_module *module;
 	struct cad_module_mesh *cad;

@@ -67,6 +67,20 @@ struct psr_material {
 /* A material that is white, rough, not metallic, opaque, one-sided, without textures. */
 void psr_material_default(struct psr_material *material);
 
+/* What there is of an exact surface: a rational B-spline, and triangles in the plane of its parameters, inside of which it
+ * is there. It is seen from the side that Su x Sv points to. */
+struct psr_patch {
+	int degree[2];             /* along u and v */
+	uint32_t n[2];             /* control points along u and v, more than the degree */
+	double *knot[2];           /* n + degree + 1, which do not fall; the domain is knot[degree]..knot[n] */
+	double (*control)[4];      /* n[0] * n[1], v fastest: x, y, z as of the mesh, and the weight, > 0 */
+	uint32_t n_corners, n_triangles, material;
+	double (*corner)[2];       /* n_corners: u and v, within the domain */
+	uint32_t (*triangle)[3];   /* n_triangles, < n_corners: counter-clockwise, u to the right and v up; they do not overlap */
+	uint8_t *rim;              /* of each triangle: bit i, the patch ends at the side from corner i to the next; bit
+	                            * 3 + i, and nothing goes on there smoothly */
+};
+
 /* Faces, and points of a cloud. Primitive i is triangle i, or from n_triangles on the disc around point i -
  * n_triangles. */
 struct psr_mesh {
@@ -81,6 +95,11 @@ struct psr_mesh {
 	float (*color)[4];              /* n_vertices, linear RGBA, multiplies the base colour; or NULL */
 	uint32_t (*triangle)[3];        /* n_triangles, each index < n_vertices, counter-clockwise seen from the front */
 	uint32_t *triangle_material;    /* n_triangles, < n_materials */
+
+	/* Exact surfaces, if they were asked for and the source has any. A patch's triangles are what else there is of it. */
+	uint32_t n_patches;
+	struct psr_patch *patch;
+	uint32_t *triangle_patch;       /* n_triangles: the patch that the triangle is of, or UINT32_MAX; NULL without patches */
 
 	double (*point)[3];             /* n_points, finite; all five arrays are NULL if there are no points */
 	float (*point_normal)[3];       /* unit length */
@@ -114,6 +133,7 @@ struct psr_import_options {
 	                 * fast, and fine enough for models of PSR_PREVIEW_RESOLUTION pixels. Thinner things may vanish */
 	uint32_t resolution; /* 8..8192: exact surfaces of STEP and IGES become triangles that are fine enough for models of so
 	                      * many pixels: they are off by an eighth of one at most */
+	int has_patches;     /* surfaces of STEP and IGES become patches, too, unless is_preview */
 };
 #define PSR_PREVIEW_RESOLUTION 64
 

@@ -7,6 +7,7 @@
 #include "base/vec.h"
 #include "dpoint/bound.h"
 #include "dpoint/mesh.h"
+#include "dpoint/trimmed.h"
 #include "model/blocks.h"
 #include "sample/octree/of_mesh.h"
 #include "surface/texture.h"
@@ -14,6 +15,8 @@
 
 #define OVERHANG 5e-4f
 #define SLACK 2e-5f       /* half a step of a place */
+#define HEM 1e-4f         /* twice of what rims of patches are off at most (import/cad) */
+#define MARGIN 0.08f      /* of points of patches: from 2 degrees aslant no step between flat ones shows (0139) */
 #define SPARSE 4          /* of candidates that come in two turns */
 
 void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)
@@ -127,6 +130,32 @@ float building_delta(const struct dpoint_build_options *o)
 	return dpoint_delta_of_class(dpoint_delta_class((float)most));
 }
 
+/* A patch looks as its first triangle does; one whose triangles are all without an area has no look, and nothing to
+ * cover. */
+static int put_patches(struct building *b, const struct dpoint_cover_options *cover)
+{
+	struct dpoint_trimmed_options o = {
+		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
+		.cell = b->options->piece, .turn = 0.5 * (double)cover->sine, .delta = building_delta(b->options),
+		.hem = (double)fminf(HEM, 0.5f * cover->overhang),
+	};
+	uint32_t *first = malloc(b->mesh->n_patches * sizeof *first);
+	int rc = PSR_OK;
+
+	if (first == NULL)
+		return psr_fail(b->err, PSR_ERR_MEMORY, "no memory for %u patches", b->mesh->n_patches);
+	memset(first, 0xff, b->mesh->n_patches * sizeof *first);
+	for (uint32_t t = b->mesh->n_triangles; t-- > 0;)
+		if (b->mesh->triangle_patch[t] != UINT32_MAX)
+			first[b->mesh->triangle_patch[t]] = t;
+	for (uint32_t i = 0; i < b->mesh->n_patches && rc == PSR_OK; i++)
+		if (first[i] != UINT32_MAX && look_at(b, first[i], 1.0 / 3, 1.0 / 3, &o.attr))
+			rc = dpoint_sample_trimmed(&b->surface, &b->mesh->patch[i], &o, b->err);
+	free(first);
+	b->surface.margin = MARGIN;
+	return rc;
+}
+
 static int put_mesh(struct building *b)
 {
 	const struct dpoint_build_options *o = b->options;
@@ -144,6 +173,8 @@ static int put_mesh(struct building *b)
 		return psr_fail(b->err, rc, "no memory for the sides of %u triangles", b->mesh->n_triangles);
 	find_grains(b);
 	rc = dpoint_sample_mesh(&b->surface, b->mesh, &mesh, b->err);
+	if (rc == PSR_OK && b->mesh->n_patches > 0)
+		rc = put_patches(b, &cover);
 	if (rc == PSR_OK && b->surface.n_candidates == 0)
 		rc = psr_fail(b->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", b->mesh->n_triangles);
 	return rc;
@@ -166,12 +197,16 @@ static int choose(struct building *b, struct dpoint_set *set, struct dpoint_buil
 int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, struct dpoint_surface *surface,
                   const uint8_t *two_sided, const struct dpoint_build_options *options)
 {
-	const struct dpoint_cover_options cover_options = building_cover(options);
+	struct dpoint_cover_options cover_options = building_cover(options);
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
 	struct dpoint_errors errors;
 	struct dpoint_bounds bounds;
-	int rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);
+	int rc;
+
+	cover_options.delta = building_delta(options);
+	cover_options.margin = surface->margin;
+	rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);
 
 	if (rc == PSR_OK)
 		rc = dpoint_set_make(set, &(struct dpoint_grouping){ surface, &choice, cover_options.sine, two_sided });

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 #include <unistd.h>
 #include "base/infile.h"
+#include "dpoint/patch.h"
 #include "import/import.h"
 #include "files.h"
 
@@ -108,6 +109,76 @@ static void a_finer_model_has_more_triangles(void **state)
 	psr_mesh_destroy(fine);
 }
 
+/* The span that u and v are in, and where they are in it. */
+static void find_span(struct dpoint_span *span, double in[2], const struct dpoint_patch *patch, const double uv[2])
+{
+	for (int k = 0; k < 2; k++) {
+		const double *knot = patch->knot[k];
+		uint32_t i = (uint32_t)patch->degree[k];
+
+		while (i + 1 < patch->n[k] && !(uv[k] < knot[i + 1] && knot[i] < knot[i + 1]))
+			i++;
+		span->at[k] = i;
+		in[k] = (uv[k] - knot[i]) / (knot[i + 1] - knot[i]);
+	}
+}
+
+/* Patches' corners are within `edge` of a pin, and have its normals: so a pin's side is one, and each of its ends. */
+static void check_patches(const char *path, double edge)
+{
+	struct psr_import_options options;
+	struct psr_mesh *mesh = NULL;
+	struct psr_error err = { 0, "" };
+	uint32_t n_triangles = 0;
+
+	psr_import_options_default(&options);
+	options.has_patches = 1;
+	if (psr_mesh_import(&mesh, path, &options, &err) != PSR_OK)
+		fail_msg("%s", err.text);
+	assert_int_equal(mesh->n_patches, 6);
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		assert_true(mesh->triangle_patch[t] < mesh->n_patches);
+	for (uint32_t i = 0; i < mesh->n_patches; i++) {
+		const struct psr_patch *p = &mesh->patch[i];
+		const struct dpoint_patch surface = { { p->degree[0], p->degree[1] }, { p->n[0], p->n[1] },
+			                                  { p->knot[0], p->knot[1] }, (const double (*)[4])p->control };
+
+		assert_int_equal(import_patch_check(p, mesh->n_materials, NULL), PSR_OK);
+		n_triangles += p->n_triangles;
+		for (uint32_t c = 0; c < p->n_corners; c++) {
+			struct dpoint_local local;
+			struct dpoint_span span;
+			double in[2], x, r;
+
+			find_span(&span, in, &surface, p->corner[c]);
+			assert_true(dpoint_patch_local(&local, &surface, &span, in));
+			x = local.at[0] - (local.at[0] > 25 ? 50 : 0);
+			r = hypot(x, local.at[1]);
+			assert_true(fabs(r - 10) < edge && local.at[2] > -edge && local.at[2] < 20 + edge);
+			if (fabs(local.axis[2][2]) > 0.5)
+				assert_true(fabs(local.axis[2][2] - (local.at[2] > 10 ? 1 : -1)) < 1e-9);
+			else
+				assert_true(fabs(local.axis[2][0] - x / r) < edge && fabs(local.axis[2][1] - local.at[1] / r) < edge);
+		}
+	}
+	assert_true(n_triangles >= mesh->n_triangles);
+	psr_mesh_destroy(mesh);
+}
+
+static void faces_are_patches_on_request(void **state)
+{
+	struct psr_mesh *mesh;
+
+	(void)state;
+	if (!has_module)
+		skip();
+	check_patches("tests/data/import/pins.step", 1e-6);
+	check_patches("tests/data/import/pins.iges", 1e-5);
+	mesh = read_pins("tests/data/import/pins.step", 256);
+	assert_true(mesh->n_patches == 0 && mesh->triangle_patch == NULL);
+	psr_mesh_destroy(mesh);
+}
+
 static void expect_end(const char *path, const char *name, const char *why)
 {
 	uint8_t *bytes = NULL;
@@ -168,6 +239,7 @@ int main(void)
 		cmocka_unit_test(step_has_places_normals_and_colors),
 		cmocka_unit_test(iges_has_places_normals_and_colors),
 		cmocka_unit_test(a_finer_model_has_more_triangles),
+		cmocka_unit_test(faces_are_patches_on_request),
 		cmocka_unit_test(a_file_that_ends_in_the_middle_is_told),
 		cmocka_unit_test(other_contents_are_told),
 	};
