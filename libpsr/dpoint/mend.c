@@ -168,11 +168,19 @@ static int find_own(struct mending *m)
 	return PSR_OK;
 }
 
-int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
-                const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel)
+/* Points that mend cover their cells whatever these look like. */
+static int cover_any(struct dpoint_cover *cover, const struct dpoint_surface *surface,
+                     const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
 	const struct dpoint_cover_options any = { .sine = options->sine, .slack = options->slack, .angle = 1, .height = 1,
 		                                      .is_within_parts = options->is_within_parts, .looks = 255 };
+
+	return cover_candidates(cover, surface, &any, work);
+}
+
+int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
+                const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel)
+{
 	const struct dpoint_work work = { pool, cancel };
 	struct tally tally;
 	struct mending m = { .surface = surface, .options = options, .tally = &tally };
@@ -190,5 +198,36 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	free(m.own);
 	bound_view_fini(&m.view);
 	tally_fini(&tally);
-	return rc == PSR_OK ? cover_candidates(cover, surface, &any, &work) : rc;
+	return rc == PSR_OK ? cover_any(cover, surface, options, &work) : rc;
+}
+
+static int is_within(struct bound_view *view, const struct dpoint_surface *surface, const struct dpoint_candidate *c,
+                     const struct dpoint_cover_options *options)
+{
+	float extent[2];
+
+	dpoint_candidate_extent(extent, c, options->sine);
+	return bound_least(view, &surface->facets, &c->point, extent, (double)options->error) <= (double)options->error;
+}
+
+int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, const uint8_t *is_open,
+                const struct dpoint_cover_options *options, const struct dpoint_work *work)
+{
+	struct bound_view view = { .seen = NULL };
+	int rc = PSR_OK;
+
+	for (uint32_t i = 0; i < surface->n_cells && rc == PSR_OK; i++) {
+		struct dpoint_candidate plane, *candidate;
+
+		if (!is_open[i] || flat_patch(&plane, surface, i, options, 1) == DPOINT_BAD ||
+		    (options->error > 0 && !is_within(&view, surface, &plane, options)))
+			continue;
+		candidate = view.is_failed ? NULL : dpoint_surface_candidate(surface);
+		if (candidate == NULL)
+			rc = PSR_ERR_MEMORY;
+		else
+			*candidate = plane;
+	}
+	bound_view_fini(&view);
+	return rc == PSR_OK ? cover_any(cover, surface, options, work) : rc;
 }

@@ -69,6 +69,11 @@ struct bound_view;
 int shrink_within(struct dpoint_candidate *c, const struct dpoint_candidate *before, struct bound_view *view,
                   const struct looking *l);
 
+/* Adds a flat candidate in the plane of each cell that is_open is set for, and to the cover. With options->error they
+ * keep it, or are left out. MEMORY, CANCELLED. */
+int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, const uint8_t *is_open,
+                const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
 /* Makes the lists of the surface's candidates that the cover lacks: its last ones. */
 int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *surface,
                      const struct dpoint_cover_options *options, const struct dpoint_work *work);

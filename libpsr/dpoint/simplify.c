@@ -5,7 +5,7 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "choice.h"
-#include "rectangle.h"
+#include "seal.h"
 
 #define CHOICE 48       /* candidates of the first turn in a rectangle; decision 0112 */
 #define MOST_SPARSE 256
@@ -133,5 +133,7 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 		rc = two_turns(surface, cover, sparse, options, &work);
 	if (rc == PSR_OK)
 		rc = dpoint_mend(surface, cover, options, pool, NULL);
-	return rc == PSR_OK ? dpoint_choose(choice, cover) : rc;
+	if (rc == PSR_OK)
+		rc = dpoint_choose(choice, cover);
+	return rc == PSR_OK ? seal(surface, choice, cover, options, &work) : rc;
 }

@@ -78,6 +78,7 @@ struct dpoint_cover_options {
 	/* Rectangles cover less than they are by this part of an extent where nothing ended it: by epsilon, or at `delta`. So
 	 * neighbours overlap, and what words tilt them by is no gap from aslant. */
 	float margin, delta;
+	const uint8_t *is_two_sided; /* by part: rectangles that are seen from both sides; NULL: none is */
 };
 
 /* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along
@@ -104,8 +105,8 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
 void dpoint_cover_fini(struct dpoint_cover *cover);
 
 /* Adds a flat candidate over each cell that none covers, and to the cover: of a cloud, one as bent as its point if there
- * is such a one. It reaches over the cell's sides by a fifth of its size, or to the sides of a rectangle around a
- * triangle: so there is no hole where samples are too far apart for the options, or where a crease is finer than a cell,
+ * is such a one. It reaches over the cell's sides by 3 to 23 % of its size, or to the sides of a rectangle around
+ * a triangle: so there is no hole where samples are too far apart for the options, or where a crease is finer than a cell,
  * and what is wrong there is as small as a cell. Left open are cells without an area, and some that are as bent as their
  * sides are long. */
 int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
@@ -136,9 +137,10 @@ int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover
 
 void dpoint_choice_fini(struct dpoint_choice *choice);
 
-/* All of it: fits candidates, mends holes, and chooses. Candidates come in two turns: of the first, every `sparse`-th at
- * random (1: all), and fewer of those whose rectangles are many cells wide; then those in cells that none of these covers;
- * others are dropped. For candidates that are much closer than their rectangles are wide, which takes so much less time.
+/* All of it: fits candidates, mends holes, chooses, and keeps or adds points where slanted rays would slip through
+ * (seal.h). Candidates come in two turns: of the first, every `sparse`-th at random (1: all), and fewer of those whose
+ * rectangles are many cells wide; then those in cells that none of these covers; others are dropped. For candidates that
+ * are much closer than their rectangles are wide, which takes so much less time.
  * MEMORY, CANCELLED; the caller ends cover and choice even then. */
 int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
                     const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool);

@@ -206,6 +206,7 @@ int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, st
 
 	cover_options.delta = building_delta(options);
 	cover_options.margin = surface->margin;
+	cover_options.is_two_sided = two_sided;
 	rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);
 
 	if (rc == PSR_OK)

@@ -1,0 +1,396 @@
+/* Rays that slip through between rectangles, and points in their way. */
+#include "seal.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/array.h"
+#include "base/vec.h"
+#include "choice.h"
+
+#define CHUNK 512 /* cells */
+#define AROUND 8  /* directions of a slant */
+#define PLACES 9  /* of a cell: corners, middles of sides, the middle */
+#define INWARDS 0.9f
+#define BEHIND 6  /* of options->height: three samples of a mesh's resolution ([G] 7.2) */
+
+static const float slant[2] = { 0.65f, SEAL_LEAST_COSINE }; /* cosines of rays to the cell's normal */
+#define DIRECTIONS (1 + 2 * AROUND)
+
+/* A kept rectangle, as rays meet it. */
+struct lid {
+	float at[3], axis[3][3], extent[2], lambda[2];
+	int is_two_sided;
+};
+
+struct sealing {
+	const struct dpoint_surface *surface;
+	const struct dpoint_cover_options *options;
+	struct lid *lid;
+	struct cell_tree tree; /* of the lids' corners */
+	uint8_t *is_open;      /* by cell */
+	uint8_t *is_due;       /* likewise: open, and none of the candidates that come is over it */
+	float around[AROUND][2], behind;
+	int is_failed;
+};
+
+static int is_two_sided(const struct dpoint_cover_options *options, uint32_t part)
+{
+	return options->is_two_sided != NULL && options->is_two_sided[part];
+}
+
+static void lid_make(struct lid *lid, struct dpoint_cell *cell, const struct dpoint_candidate *c,
+                     const struct dpoint_cover_options *options)
+{
+	struct rectangle r;
+
+	rectangle_of(&r, c, options);
+	memcpy(lid->at, r.at, sizeof lid->at);
+	memcpy(lid->axis, r.axis, sizeof lid->axis);
+	lid->is_two_sided = is_two_sided(options, c->part);
+	lid->lambda[0] = r.lambda_u;
+	lid->lambda[1] = r.lambda_u * r.rho;
+	for (int k = 0; k < 2; k++)
+		lid->extent[k] = fmaxf(0, r.extent[k] - options->slack);
+	memset(cell, 0, sizeof *cell);
+	for (int i = 0; i < 4; i++) {
+		v3f_add_scaled(cell->corner[i], r.at, i == 0 || i == 3 ? lid->extent[0] : -lid->extent[0], r.axis[0]);
+		v3f_add_scaled(cell->corner[i], cell->corner[i], i < 2 ? lid->extent[1] : -lid->extent[1], r.axis[1]);
+	}
+}
+
+static float quadric_at(const struct lid *lid, float u, float v)
+{
+	return 0.5f * (lid->lambda[0] * u * u + lid->lambda[1] * v * v);
+}
+
+static void quadric_normal(float n[3], const struct lid *lid, float u, float v)
+{
+	v3f_set(n, -lid->lambda[0] * u, -lid->lambda[1] * v, 1);
+}
+
+/* ---- a cell ---- */
+
+/* Lids around a cell. */
+struct nearby {
+	uint32_t *lid;
+	size_t n, room;
+	int is_failed;
+};
+
+static void gather(struct nearby *nearby, const struct cell_tree *tree, size_t i, const float middle[3], float radius)
+{
+	const struct cell_node *node = &tree->node[i];
+	float away[3];
+
+	v3f_sub(away, node->middle, middle);
+	if (v3f_dot(away, away) > (node->radius + radius) * (node->radius + radius))
+		return;
+	if (!cell_node_is_leaf(node)) {
+		gather(nearby, tree, 2 * i + 1, middle, radius);
+		gather(nearby, tree, 2 * i + 2, middle, radius);
+		return;
+	}
+	if (!ARRAY_ROOM(nearby->lid, nearby->n, nearby->room)) {
+		nearby->is_failed = 1;
+		return;
+	}
+	nearby->lid[nearby->n++] = tree->order[node->begin];
+}
+
+/* Whether the lid stops each ray to the place whose cosine to `normal` is at least SEAL_LEAST_COSINE: its quadric is so
+ * near to the place, leans so little and is so nearly flat there that all of them meet it well within its sides. */
+static int stops_all(const struct lid *lid, const float p[3], const float normal[3], float behind)
+{
+	const float bent = fabsf(lid->lambda[0]), off = fabsf(p[2] - quadric_at(lid, p[0], p[1]));
+	float n[3], cosine, lean, least, reach;
+
+	if (!(fabsf(p[0]) <= lid->extent[0] && fabsf(p[1]) <= lid->extent[1]))
+		return 0;
+	quadric_normal(n, lid, p[0], p[1]);
+	v3f_normalize(n, n);
+	m3f_apply_transposed(n, (const float (*)[3])lid->axis, n);
+	cosine = fminf(1, v3f_dot(n, normal));
+	lean = sqrtf(1 - cosine * cosine);
+	least = cosine * SEAL_LEAST_COSINE - lean * sqrtf(1 - SEAL_LEAST_COSINE * SEAL_LEAST_COSINE);
+	if (!(least > 0))
+		return 0;
+	reach = 2 * off / least;
+	return bent * reach <= 0.25f * least && reach <= behind && fabsf(p[0]) + reach <= lid->extent[0] &&
+	       fabsf(p[1]) + reach <= lid->extent[1];
+}
+
+/* Whether a ray from p in direction w, in the frame of the lid, meets its quadric within its sides, from `side`. It is
+ * met where A t^2 + B t + C is 0; of its roots each has its side. */
+static int meets(const struct lid *lid, const float p[3], const float w[3], float side, float behind)
+{
+	const float *l = lid->lambda;
+	const float a = 0.5f * (l[0] * w[0] * w[0] + l[1] * w[1] * w[1]);
+	const float b = l[0] * p[0] * w[0] + l[1] * p[1] * w[1] - w[2];
+	const float c = quadric_at(lid, p[0], p[1]) - p[2], inside = b * b - 4 * a * c;
+	float root, t;
+
+	if (inside < 0)
+		return 0;
+	root = side * sqrtf(inside);
+	t = side * b <= 0 ? 2 * c / (root - b) : (-b - root) / (2 * a);
+	return t >= -behind && fabsf(p[0] + t * w[0]) <= lid->extent[0] && fabsf(p[1] + t * w[1]) <= lid->extent[1];
+}
+
+/* Whether the lid is in the way of the ray that comes from `from` to the place. */
+static int stops(const struct lid *lid, const float p[3], const float from[3], float behind)
+{
+	float w[3];
+
+	m3f_apply(w, (const float (*)[3])lid->axis, from);
+	return meets(lid, p, w, 1, behind) || (lid->is_two_sided && meets(lid, p, w, -1, behind));
+}
+
+static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, const float at[3],
+                        const float (*from)[3], const float normal[3])
+{
+	int n_open = DIRECTIONS;
+	uint8_t is_stopped[DIRECTIONS] = { 0 };
+
+	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+		const struct lid *lid = &s->lid[nearby->lid[i]];
+		float away[3], p[3];
+
+		v3f_sub(away, at, lid->at);
+		m3f_apply(p, (const float (*)[3])lid->axis, away);
+		if (stops_all(lid, p, normal, s->behind))
+			return 1;
+	}
+	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+		const struct lid *lid = &s->lid[nearby->lid[i]];
+		float away[3], p[3];
+
+		v3f_sub(away, at, lid->at);
+		m3f_apply(p, (const float (*)[3])lid->axis, away);
+		for (int d = 0; d < DIRECTIONS; d++)
+			if (!is_stopped[d] && stops(lid, p, from[d], s->behind)) {
+				is_stopped[d] = 1;
+				n_open--;
+			}
+	}
+	return n_open == 0;
+}
+
+/* Where rays to a cell come from: its plane's normal, and around it. Returns 0 of a cell without an area. */
+static int directions(float (*from)[3], const struct sealing *s, const struct dpoint_cell *cell)
+{
+	float a[3], b[3], x[3], y[3], normal[3];
+
+	v3f_sub(a, cell->corner[2], cell->corner[0]);
+	v3f_sub(b, cell->corner[3], cell->corner[1]);
+	v3f_cross(normal, a, b);
+	if (v3f_normalize(normal, normal) == 0)
+		return 0;
+	if (v3f_dot(normal, cell->normal) < 0)
+		v3f_scale(normal, normal, -1);
+	dpoint_tangents(x, y, normal);
+	memcpy(from[0], normal, sizeof from[0]);
+	for (int d = 0; d < 2 * AROUND; d++) {
+		const float cosine = slant[d / AROUND], sine = sqrtf(1 - cosine * cosine), *turn = s->around[d % AROUND];
+
+		v3f_scale(from[1 + d], normal, cosine);
+		v3f_add_scaled(from[1 + d], from[1 + d], sine * turn[0], x);
+		v3f_add_scaled(from[1 + d], from[1 + d], sine * turn[1], y);
+	}
+	return 1;
+}
+
+static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
+{
+	const struct dpoint_cell *cell = &s->surface->cell[at];
+	float from[DIRECTIONS][3], middle[3], radius = 0, away[3];
+
+	if (cell->part == DPOINT_BEYOND || !directions(from, s, cell))
+		return 1;
+	for (int k = 0; k < 3; k++)
+		middle[k] = 0.25f * (cell->corner[0][k] + cell->corner[1][k] + cell->corner[2][k] + cell->corner[3][k]);
+	for (int c = 0; c < 4; c++) {
+		v3f_sub(away, cell->corner[c], middle);
+		radius = fmaxf(radius, v3f_length(away));
+	}
+	nearby->n = 0;
+	gather(nearby, &s->tree, 0, middle, radius + 2 * s->behind);
+	for (int side = 0; side < 1 + is_two_sided(s->options, cell->part); side++) {
+		for (int p = 0; p < PLACES; p++) {
+			const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
+			float place[3];
+
+			for (int k = 0; k < 3; k++)
+				place[k] = p == 8 ? middle[k] : middle[k] + INWARDS * (0.5f * (corner[k] + next[k]) - middle[k]);
+			if (!is_sealed_at(s, nearby, place, (const float (*)[3])from, from[0]))
+				return 0;
+		}
+		for (int d = 0; d < DIRECTIONS; d++)
+			v3f_scale(from[d], from[d], -1);
+	}
+	return 1;
+}
+
+static void look(int chunk, void *userdata)
+{
+	struct sealing *s = userdata;
+	const size_t begin = (size_t)chunk * CHUNK;
+	const size_t end = begin + CHUNK < s->surface->n_cells ? begin + CHUNK : s->surface->n_cells;
+	struct nearby nearby = { NULL, 0, 0, 0 };
+
+	for (size_t i = begin; i < end; i++)
+		if (s->is_open[i])
+			s->is_open[i] = (uint8_t)!is_sealed(s, &nearby, (uint32_t)i);
+	if (nearby.is_failed)
+		__atomic_store_n(&s->is_failed, 1, __ATOMIC_RELAXED);
+	free(nearby.lid);
+}
+
+/* ---- all cells ---- */
+
+static int make_lids(struct sealing *s, const struct dpoint_choice *choice)
+{
+	struct dpoint_cell *cell = malloc((choice->n_kept + 1) * sizeof *cell);
+	size_t n = 0;
+	int rc;
+
+	s->lid = malloc((choice->n_kept + 1) * sizeof *s->lid);
+	if (cell == NULL || s->lid == NULL) {
+		free(cell);
+		return PSR_ERR_MEMORY;
+	}
+	for (size_t i = 0; i < s->surface->n_candidates; i++)
+		if (choice->is_kept[i]) {
+			lid_make(&s->lid[n], &cell[n], &s->surface->candidate[i], s->options);
+			n++;
+		}
+	rc = cell_tree_init(&s->tree, cell, n);
+	free(cell);
+	return rc;
+}
+
+/* ---- what comes in their way ---- */
+
+static size_t count_open(const struct sealing *s, const struct dpoint_cover *cover, uint32_t candidate)
+{
+	size_t n = 0;
+
+	for (uint32_t k = 0; k < cover->n[candidate]; k++) {
+		const struct cell_node *node = &cover->tree->node[cover->list[candidate][k]];
+
+		for (uint32_t c = node->begin; c < node->end; c++)
+			n += s->is_due[cover->tree->order[c]];
+	}
+	return n;
+}
+
+static void mark_done(struct sealing *s, const struct dpoint_cover *cover, uint32_t candidate)
+{
+	for (uint32_t k = 0; k < cover->n[candidate]; k++) {
+		const struct cell_node *node = &cover->tree->node[cover->list[candidate][k]];
+
+		for (uint32_t c = node->begin; c < node->end; c++)
+			s->is_due[cover->tree->order[c]] = 0;
+	}
+}
+
+/* Keeps candidates that were left out, such that each open cell that one of them covers gets one: first who covers most
+ * of them. */
+static int keep_more(struct sealing *s, struct dpoint_choice *choice, const struct dpoint_cover *cover)
+{
+	struct heap heap = { malloc((cover->n_candidates + 1) * sizeof *heap.entry), 0 };
+
+	if (heap.entry == NULL)
+		return PSR_ERR_MEMORY;
+	memcpy(s->is_due, s->is_open, s->surface->n_cells);
+	for (uint32_t i = 0; i < cover->n_candidates; i++) {
+		const size_t n = choice->is_kept[i] ? 0 : count_open(s, cover, i);
+
+		if (n > 0)
+			heap.entry[heap.n++] = (struct heap_entry){ (float)n, i };
+	}
+	heap_make(&heap);
+	while (heap.n > 0) {
+		const uint32_t i = heap.entry[0].candidate;
+		const float n = (float)count_open(s, cover, i);
+
+		if (n > 0 && n < heap.entry[0].key) {
+			heap_lower(&heap, n);
+			continue;
+		}
+		heap_pop(&heap);
+		if (n == 0)
+			continue;
+		choice->is_kept[i] = 1;
+		choice->n_kept++;
+		mark_done(s, cover, i);
+	}
+	free(heap.entry);
+	return PSR_OK;
+}
+
+static int look_all(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_work *work)
+{
+	int rc = make_lids(s, choice);
+
+	if (rc == PSR_OK)
+		rc = psr_pool_for_until(work->pool, work->cancel, (int)((s->surface->n_cells + CHUNK - 1) / CHUNK), look, s);
+	cell_tree_fini(&s->tree);
+	free(s->lid);
+	memset(&s->tree, 0, sizeof s->tree);
+	s->lid = NULL;
+	return rc == PSR_OK && s->is_failed ? PSR_ERR_MEMORY : rc;
+}
+
+static int keep_planes(struct dpoint_choice *choice, size_t before, size_t n)
+{
+	uint8_t *is_kept = realloc(choice->is_kept, n + 1);
+
+	if (is_kept == NULL)
+		return PSR_ERR_MEMORY;
+	choice->is_kept = is_kept;
+	memset(is_kept + before, 1, n - before);
+	choice->n_kept += n - before;
+	return PSR_OK;
+}
+
+static void set_around(struct sealing *s)
+{
+	for (int d = 0; d < AROUND; d++) {
+		double sine, cosine;
+
+		psr_sincos((d + 0.5) * (2 * 3.14159265358979 / AROUND), &sine, &cosine);
+		s->around[d][0] = (float)cosine;
+		s->around[d][1] = (float)sine;
+	}
+}
+
+int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
+         const struct dpoint_cover_options *options, const struct dpoint_work *work)
+{
+	struct sealing s = { .surface = surface, .options = options, .behind = BEHIND * options->height };
+	const size_t before = surface->n_candidates;
+	int rc;
+
+	if (choice->n_kept == 0 || surface->is_cloud)
+		return PSR_OK;
+	set_around(&s);
+	s.is_open = malloc(surface->n_cells);
+	s.is_due = malloc(surface->n_cells);
+	rc = s.is_open != NULL && s.is_due != NULL ? PSR_OK : PSR_ERR_MEMORY;
+	if (rc == PSR_OK) {
+		memset(s.is_open, 1, surface->n_cells);
+		rc = look_all(&s, choice, work);
+	}
+	if (rc == PSR_OK)
+		rc = keep_more(&s, choice, cover);
+	if (rc == PSR_OK)
+		rc = look_all(&s, choice, work);
+	if (rc == PSR_OK)
+		rc = mend_planes(surface, cover, s.is_open, options, work);
+	if (rc == PSR_OK)
+		rc = keep_planes(choice, before, surface->n_candidates);
+	free(s.is_open);
+	free(s.is_due);
+	return rc;
+}

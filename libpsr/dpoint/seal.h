@@ -1,0 +1,19 @@
+/* No ray slips through between kept rectangles. */
+#ifndef PSR_DPOINT_SEAL_H
+#define PSR_DPOINT_SEAL_H
+
+#include "rectangle.h"
+
+/* Cosine to the surface's normal of the flattest rays that are looked at: they graze it at 20 degrees. */
+#define SEAL_LEAST_COSINE 0.35f
+
+/* Quadrics over neighbouring places end at slightly different heights, so a slanted ray may pass over one and under the
+ * other. Each cell is looked at along 17 rays to each of 9 places. Where one gets through, which nothing stops until six
+ * times options->height behind the place, candidates that were left out are kept, those first that are over most such
+ * cells; where it still does, a flat point in the cell's own plane. Planes of neighbouring cells meet at their sides, so
+ * these leave no gap. Clouds are left as they are: their cells do not meet. Adds to surface, choice and cover. MEMORY,
+ * CANCELLED. */
+int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
+         const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
+#endif

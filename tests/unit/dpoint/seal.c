@@ -1,0 +1,198 @@
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+#include "base/random.h"
+#include "base/vec.h"
+#include "dpoint/mesh.h"
+#include "dpoint/seal.h"
+
+#define SIDE 12 /* squares of the mesh */
+
+/* A rough square: quadrics of its points agree with their neighbours badly. Nothing of it is freed. */
+struct rough {
+	struct psr_mesh mesh;
+	double position[(SIDE + 1) * (SIDE + 1)][3];
+	float normal[(SIDE + 1) * (SIDE + 1)][3];
+	uint32_t triangle[2 * SIDE * SIDE][3], material[2 * SIDE * SIDE];
+};
+
+static void add_normals(struct rough *m)
+{
+	for (uint32_t t = 0; t < m->mesh.n_triangles; t++) {
+		const uint32_t *v = m->triangle[t];
+		double a[3], b[3], n[3];
+
+		v3d_sub(a, m->position[v[1]], m->position[v[0]]);
+		v3d_sub(b, m->position[v[2]], m->position[v[0]]);
+		v3d_cross(n, a, b);
+		for (int i = 0; i < 3; i++)
+			for (int k = 0; k < 3; k++)
+				m->normal[v[i]][k] += (float)n[k];
+	}
+	for (uint32_t v = 0; v < m->mesh.n_vertices; v++)
+		v3f_normalize(m->normal[v], m->normal[v]);
+}
+
+static void make_rough(struct rough *m, double height)
+{
+	uint64_t seed = 5;
+	uint32_t n = 0;
+
+	memset(m, 0, sizeof *m);
+	for (uint32_t j = 0; j <= SIDE; j++)
+		for (uint32_t i = 0; i <= SIDE; i++) {
+			const uint32_t v = j * (SIDE + 1) + i;
+
+			v3d_set(m->position[v], i / (double)SIDE - 0.5, j / (double)SIDE - 0.5,
+			        random_in(&seed, -0.5, 0.5) * height / SIDE);
+			if (i == SIDE || j == SIDE)
+				continue;
+			memcpy(m->triangle[n++], ((uint32_t[]){ v, v + 1, v + SIDE + 1 }), 12);
+			memcpy(m->triangle[n++], ((uint32_t[]){ v + 1, v + SIDE + 2, v + SIDE + 1 }), 12);
+		}
+	m->mesh = (struct psr_mesh){ .n_vertices = (SIDE + 1) * (SIDE + 1), .n_triangles = n, .position = m->position,
+		                         .normal = m->normal, .triangle = m->triangle, .triangle_material = m->material };
+	add_normals(m);
+}
+
+/* Whether a ray through the origin towards w meets z = (a x^2 + b y^2) / 2, moved by p, within the extents, with its
+ * normal towards w and no further than `behind` behind the origin. By steps of a Newton iteration from both ends of what
+ * may count, in doubles. */
+static int is_stopped(const double p[3], const double w[3], const double l[2], const double extent[2], double behind)
+{
+	for (int from = 0; from < 2; from++) {
+		double t = from ? 0.5 : -behind;
+
+		for (int i = 0; i < 20; i++) {
+			const double x = p[0] + t * w[0], y = p[1] + t * w[1];
+			const double off = p[2] + t * w[2] - 0.5 * (l[0] * x * x + l[1] * y * y);
+			const double slope = w[2] - l[0] * x * w[0] - l[1] * y * w[1];
+
+			if (fabs(off) < 1e-12 && slope > 0 && t >= -behind && fabs(x) <= extent[0] && fabs(y) <= extent[1])
+				return 1;
+			t -= off / (fabs(slope) > 1e-9 ? slope : 1e-9);
+		}
+	}
+	return 0;
+}
+
+static int gets_through(const struct dpoint_surface *surface, const struct dpoint_choice *choice,
+                        const struct dpoint_cover_options *o, const double at[3], const double w[3])
+{
+	for (size_t i = 0; i < surface->n_candidates; i++) {
+		const struct dpoint_candidate *c = &surface->candidate[i];
+		const double l[2] = { c->point.lambda_u, c->point.lambda_u * c->point.rho };
+		double axis[3][3], p[3], r[3], wide[2];
+		float extent[2];
+
+		if (!choice->is_kept[i])
+			continue;
+		for (int k = 0; k < 3; k++) {
+			axis[0][k] = c->point.u[k];
+			axis[2][k] = c->point.normal[k];
+		}
+		v3d_cross(axis[1], axis[2], axis[0]);
+		for (int k = 0; k < 3; k++) {
+			p[k] = r[k] = 0;
+			for (int j = 0; j < 3; j++) {
+				p[k] += axis[k][j] * (at[j] - c->point.at[j]);
+				r[k] += axis[k][j] * w[j];
+			}
+		}
+		dpoint_candidate_extent(extent, c, o->sine);
+		for (int k = 0; k < 2; k++)
+			wide[k] = extent[k];
+		if (v3d_length(p) > 2 * (wide[0] + wide[1]) + 0.1) /* quadrics lean less than that */
+			continue;
+		if (is_stopped(p, r, l, wide, 6.001 * o->height))
+			return 0;
+	}
+	return 1;
+}
+
+/* Rays to the middles of cells and near their corners, of 0, 49 and 69.5 degrees to their planes' normals. */
+static size_t count_through(const struct dpoint_surface *surface, const struct dpoint_choice *choice,
+                            const struct dpoint_cover_options *o)
+{
+	size_t n = 0;
+
+	for (size_t i = 0; i < surface->n_cells; i++) {
+		const struct dpoint_cell *cell = &surface->cell[i];
+		float a[3], b[3], normal[3], x[3], y[3];
+
+		if (cell->part == DPOINT_BEYOND)
+			continue;
+		v3f_sub(a, cell->corner[2], cell->corner[0]);
+		v3f_sub(b, cell->corner[3], cell->corner[1]);
+		v3f_cross(normal, a, b);
+		v3f_normalize(normal, normal);
+		v3f_scale(normal, normal, v3f_dot(normal, cell->normal) < 0 ? -1 : 1);
+		dpoint_tangents(x, y, normal);
+		for (int place = 0; place < 5; place++)
+			for (int d = 0; d < 17; d++) {
+				const double angle = (d % 8 + 0.5) * (6.283185307179586 / 8);
+				const double cosine = d == 16 ? 1 : d < 8 ? 0.35 : 0.65, sine = sqrt(1 - cosine * cosine);
+				double at[3], w[3];
+
+				for (int k = 0; k < 3; k++) {
+					const double middle = 0.25 * ((double)cell->corner[0][k] + cell->corner[1][k] +
+					                              cell->corner[2][k] + cell->corner[3][k]);
+
+					at[k] = place == 4 ? middle : middle + 0.9 * (cell->corner[place][k] - middle);
+					w[k] = cosine * normal[k] + sine * (cos(angle) * x[k] + sin(angle) * y[k]);
+				}
+				n += (size_t)gets_through(surface, choice, o, at, w);
+			}
+	}
+	return n;
+}
+
+static void no_ray_that_is_looked_at_gets_through(void **state)
+{
+	const struct dpoint_cover_options options = {
+		.sine = dpoint_sine(0.01), .slack = 1e-5f, .angle = 0.06f, .height = 0.002f, .overhang = 5e-4f,
+	};
+	const struct dpoint_mesh_options mesh = { .scale = 1, .cell = 0.1, .delta = 0.25f };
+	struct rough *m = malloc(sizeof *m);
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+	size_t n_kept;
+
+	(void)state;
+	assert_non_null(m);
+	make_rough(m, 0.6);
+	/* Without it some do: else this would test nothing. */
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &mesh, NULL), PSR_OK);
+	assert_int_equal(dpoint_fit(&surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
+	assert_int_equal(choice.n_holes, 0);
+	n_kept = choice.n_kept;
+	assert_true(count_through(&surface, &choice, &options) > 0);
+	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
+	assert_int_equal(count_through(&surface, &choice, &options), 0);
+	assert_true(choice.n_kept > n_kept && choice.n_kept < surface.n_candidates);
+	/* And what is whole gets nothing. */
+	n_kept = choice.n_kept;
+	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
+	assert_int_equal(choice.n_kept, n_kept);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+	free(m);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(no_ray_that_is_looked_at_gets_through),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
