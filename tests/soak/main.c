@@ -22,7 +22,7 @@
 #define CONNECTION_BYTES 131072
 #define MOST_WINDOWS 100000
 
-const char *const soak_model[SOAK_MODELS] = { "case", "dice", "hill", "knot", "ring", "scan", "teapot", "top", "wheel" };
+const char *const soak_model[SOAK_MODELS] = { "case", "dice", "gloss", "hill", "knot", "ring", "scan", "teapot", "top", "wheel" };
 
 struct soak soak = { .models = "tests/golden", .seconds = 60, .seed = 1, .patience_ms = 30000 };
 

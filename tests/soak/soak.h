@@ -10,7 +10,7 @@
 
 #define SOAK_CLIENTS 64
 #define SOAK_WINDOW_NS UINT64_C(2000000000)
-#define SOAK_MODELS 9
+#define SOAK_MODELS 10
 
 extern const char *const soak_model[SOAK_MODELS];
 
