@@ -22,7 +22,7 @@ static void sample(struct dpoint_surface *surface, const struct dpoint_patch *pa
 
 static struct dpoint_cover_options options(double epsilon, float angle)
 {
-	return (struct dpoint_cover_options){ dpoint_sine(epsilon), 1e-5f, angle, 1, 0, 0, 0, 0, 0, 0 };
+	return (struct dpoint_cover_options){ .sine = dpoint_sine(epsilon), .slack = 1e-5f, .angle = angle, .height = 1 };
 }
 
 /* A cell in a candidate's frame, in double: how far its corners are inside of the shortened rectangle (negative:
@@ -220,7 +220,7 @@ static void no_ray_slips_between_the_chosen_rectangles(void **state)
 	const double epsilon = 0.03;
 	const double least_cosine = 0.1, height = 0.0005;
 	const struct dpoint_cover_options o = {
-		dpoint_sine(epsilon), (float)(2 * height / least_cosine), 3, (float)height, 0, 0, 0, 0, 0, 0,
+		.sine = dpoint_sine(epsilon), .slack = (float)(2 * height / least_cosine), .angle = 3, .height = (float)height,
 	};
 	struct revolved shape[2];
 

@@ -174,7 +174,9 @@ static void no_extent_crosses_an_edge(void **state)
 /* After the fit, what is under a rectangle suits it: normals are within the angle wherever the surface goes on. */
 static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.2), 1e-5f, 0.06f, 0.01f, 0, OVERHANG, 0, 0, 0, 0 };
+	const struct dpoint_cover_options options = {
+		.sine = dpoint_sine(0.2), .slack = 1e-5f, .angle = 0.06f, .height = 0.01f, .overhang = OVERHANG,
+	};
 	struct dpoint_surface surface;
 	struct revolved torus;
 	size_t n = 0;
@@ -220,7 +222,9 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 
 static void two_turns_cover_all_with_little_more(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.03), 1e-5f, 0.06f, 0.01f, 0, OVERHANG, 0, 0, 0, 0 };
+	const struct dpoint_cover_options options = {
+		.sine = dpoint_sine(0.03), .slack = 1e-5f, .angle = 0.06f, .height = 0.01f, .overhang = OVERHANG,
+	};
 	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0, 0, 0 };
 	struct revolved torus;
 	size_t n_kept[2];
@@ -248,7 +252,7 @@ static void two_turns_cover_all_with_little_more(void **state)
 static void mending_leaves_no_hole(void **state)
 {
 	/* Extents of 0.02 r where candidates are 0.1 r apart. */
-	const struct dpoint_cover_options options = { 0.02f, 1e-5f, 0.05f, 0.001f, 0, 0, 0, 0, 0, 0 };
+	const struct dpoint_cover_options options = { .sine = 0.02f, .slack = 1e-5f, .angle = 0.05f, .height = 0.001f };
 	struct grid_mesh *m = malloc(sizeof *m);
 	struct dpoint_surface surface;
 	struct dpoint_cover cover;
