@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include "model/cubes.h"
+#include "surface/material.h"
 
 /* Bits a leaf of the arrays of a tree. */
 struct stream {
@@ -29,13 +30,13 @@ static void take_streams(struct stream streams[N_STREAMS], const struct octree *
 		streams[2 + i].packed = 8.0 * (double)shares->stream[i] / n;
 }
 
-/* Of a sample's attributes (model/blocks.h). */
 static void print_material(uint32_t material)
 {
-	const double root = fmin((material >> 5 & 31) / 30.0, 1);
+	struct look look;
 
-	printf("  %-14s  metallic %.2f, reflectance %.3f, roughness %.2f\n", "one material", (material & 31) / 31.0,
-	       root * root, (material >> 16) / 255.0);
+	material_decode(&look, (uint64_t)material << 40);
+	printf("  %-14s  metallic %.2f, reflectance %.3f, roughness %.2f\n", "one material", (double)look.metallic,
+	       (double)look.reflectance, (double)look.roughness);
 }
 
 void info_print_octree(const struct octree *tree, const struct octree_shares *shares, double scale)

@@ -3,12 +3,6 @@
 #include <stdlib.h>
 #include "base/vec.h"
 
-static void middle_of(float m[3], const struct dpoint_cell *cell)
-{
-	for (int k = 0; k < 3; k++)
-		m[k] = 0.25f * (cell->corner[0][k] + cell->corner[1][k] + cell->corner[2][k] + cell->corner[3][k]);
-}
-
 struct entry {
 	float middle[3];
 	uint32_t cell;
@@ -149,7 +143,7 @@ int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_
 		return PSR_ERR_MEMORY;
 	}
 	for (size_t i = 0; i < n; i++) {
-		middle_of(m.entry[i].middle, &cell[i]);
+		dpoint_cell_middle(m.entry[i].middle, &cell[i]);
 		m.entry[i].cell = (uint32_t)i;
 	}
 	split(&m, 0, 0, (uint32_t)n);

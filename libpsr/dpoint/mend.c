@@ -91,6 +91,15 @@ static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint3
 	return rectangle_around(out->delta, out, &m->surface->cell[at], m->options);
 }
 
+static double error_of(struct bound_view *view, const struct dpoint_surface *surface, const struct dpoint_candidate *c,
+                       const struct dpoint_cover_options *options)
+{
+	float extent[2];
+
+	dpoint_candidate_extent(extent, c, options->sine);
+	return bound_least(view, &surface->facets, &c->point, extent, (double)options->error);
+}
+
 /* Finds the first kind of patch that is within the error, or the nearest. Returns 0 where none is near the surface at
  * all; *is_bad: there is none of any kind. */
 static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mending *m, uint32_t at)
@@ -100,14 +109,12 @@ static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mendi
 
 	*is_bad = 1;
 	for (enum kind kind = BENT; kind < N_KINDS && least > (double)m->options->error && !m->view.is_failed; kind++) {
-		float extent[2];
 		double error;
 
 		if (!patch_of(&patch, m, at, kind))
 			continue;
 		*is_bad = 0;
-		dpoint_candidate_extent(extent, &patch, m->options->sine);
-		error = bound_least(&m->view, &m->surface->facets, &patch.point, extent, (double)m->options->error);
+		error = error_of(&m->view, m->surface, &patch, m->options);
 		if (error < least) {
 			least = error;
 			*out = patch;
@@ -201,15 +208,6 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	return rc == PSR_OK ? cover_any(cover, surface, options, &work) : rc;
 }
 
-static int is_within(struct bound_view *view, const struct dpoint_surface *surface, const struct dpoint_candidate *c,
-                     const struct dpoint_cover_options *options)
-{
-	float extent[2];
-
-	dpoint_candidate_extent(extent, c, options->sine);
-	return bound_least(view, &surface->facets, &c->point, extent, (double)options->error) <= (double)options->error;
-}
-
 int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, const uint8_t *is_open,
                 const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
@@ -220,7 +218,7 @@ int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, cons
 		struct dpoint_candidate plane, *candidate;
 
 		if (!is_open[i] || flat_patch(&plane, surface, i, options, 1) == DPOINT_BAD ||
-		    (options->error > 0 && !is_within(&view, surface, &plane, options)))
+		    (options->error > 0 && !(error_of(&view, surface, &plane, options) <= (double)options->error)))
 			continue;
 		candidate = view.is_failed ? NULL : dpoint_surface_candidate(surface);
 		if (candidate == NULL)

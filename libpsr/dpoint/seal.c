@@ -7,6 +7,7 @@
 #include "base/array.h"
 #include "base/vec.h"
 #include "choice.h"
+#include "group.h"
 
 #define CHUNK 512 /* cells */
 #define AROUND 8  /* directions of a slant */
@@ -17,9 +18,9 @@
 static const float slant[2] = { 0.65f, SEAL_LEAST_COSINE }; /* cosines of rays to the cell's normal */
 #define DIRECTIONS (1 + 2 * AROUND)
 
-/* A kept rectangle, as rays meet it. */
+/* A kept rectangle, less the slack, as rays meet it. */
 struct lid {
-	float at[3], axis[3][3], extent[2], lambda[2];
+	struct rectangle rectangle;
 	int is_two_sided;
 };
 
@@ -42,31 +43,17 @@ static int is_two_sided(const struct dpoint_cover_options *options, uint32_t par
 static void lid_make(struct lid *lid, struct dpoint_cell *cell, const struct dpoint_candidate *c,
                      const struct dpoint_cover_options *options)
 {
-	struct rectangle r;
+	struct rectangle *r = &lid->rectangle;
 
-	rectangle_of(&r, c, options);
-	memcpy(lid->at, r.at, sizeof lid->at);
-	memcpy(lid->axis, r.axis, sizeof lid->axis);
+	rectangle_of(r, c, options);
 	lid->is_two_sided = is_two_sided(options, c->part);
-	lid->lambda[0] = r.lambda_u;
-	lid->lambda[1] = r.lambda_u * r.rho;
 	for (int k = 0; k < 2; k++)
-		lid->extent[k] = fmaxf(0, r.extent[k] - options->slack);
+		r->extent[k] = fmaxf(0, r->extent[k] - options->slack);
 	memset(cell, 0, sizeof *cell);
 	for (int i = 0; i < 4; i++) {
-		v3f_add_scaled(cell->corner[i], r.at, i == 0 || i == 3 ? lid->extent[0] : -lid->extent[0], r.axis[0]);
-		v3f_add_scaled(cell->corner[i], cell->corner[i], i < 2 ? lid->extent[1] : -lid->extent[1], r.axis[1]);
+		v3f_add_scaled(cell->corner[i], r->at, i == 0 || i == 3 ? r->extent[0] : -r->extent[0], r->axis[0]);
+		v3f_add_scaled(cell->corner[i], cell->corner[i], i < 2 ? r->extent[1] : -r->extent[1], r->axis[1]);
 	}
-}
-
-static float quadric_at(const struct lid *lid, float u, float v)
-{
-	return 0.5f * (lid->lambda[0] * u * u + lid->lambda[1] * v * v);
-}
-
-static void quadric_normal(float n[3], const struct lid *lid, float u, float v)
-{
-	v3f_set(n, -lid->lambda[0] * u, -lid->lambda[1] * v, 1);
 }
 
 /* ---- a cell ---- */
@@ -98,43 +85,44 @@ static void gather(struct nearby *nearby, const struct cell_tree *tree, size_t i
 	nearby->lid[nearby->n++] = tree->order[node->begin];
 }
 
-/* Whether the lid stops each ray to the place whose cosine to `normal` is at least SEAL_LEAST_COSINE: its quadric is so
- * near to the place, leans so little and is so nearly flat there that all of them meet it well within its sides. */
-static int stops_all(const struct lid *lid, const float p[3], const float normal[3], float behind)
+/* Whether the rectangle stops each ray to the place p, in its frame, whose cosine to `normal` is at least
+ * SEAL_LEAST_COSINE: its quadric is so near to the place, leans so little and is so nearly flat there that all of them
+ * meet it well within its sides. */
+static int stops_all(const struct rectangle *r, const float p[3], const float normal[3], float behind)
 {
-	const float bent = fabsf(lid->lambda[0]), off = fabsf(p[2] - quadric_at(lid, p[0], p[1]));
+	const float off = fabsf(p[2] - dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1]));
 	float n[3], cosine, lean, least, reach;
 
-	if (!(fabsf(p[0]) <= lid->extent[0] && fabsf(p[1]) <= lid->extent[1]))
+	if (!(fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]))
 		return 0;
-	quadric_normal(n, lid, p[0], p[1]);
+	v3f_set(n, -(r->lambda_u * p[0]), -(r->lambda_u * r->rho * p[1]), 1);
 	v3f_normalize(n, n);
-	m3f_apply_transposed(n, (const float (*)[3])lid->axis, n);
+	m3f_apply_transposed(n, (const float (*)[3])r->axis, n);
 	cosine = fminf(1, v3f_dot(n, normal));
 	lean = sqrtf(1 - cosine * cosine);
 	least = cosine * SEAL_LEAST_COSINE - lean * sqrtf(1 - SEAL_LEAST_COSINE * SEAL_LEAST_COSINE);
 	if (!(least > 0))
 		return 0;
 	reach = 2 * off / least;
-	return bent * reach <= 0.25f * least && reach <= behind && fabsf(p[0]) + reach <= lid->extent[0] &&
-	       fabsf(p[1]) + reach <= lid->extent[1];
+	return fabsf(r->lambda_u) * reach <= 0.25f * least && reach <= behind && fabsf(p[0]) + reach <= r->extent[0] &&
+	       fabsf(p[1]) + reach <= r->extent[1];
 }
 
-/* Whether a ray from p in direction w, in the frame of the lid, meets its quadric within its sides, from `side`. It is
- * met where A t^2 + B t + C is 0; of its roots each has its side. */
-static int meets(const struct lid *lid, const float p[3], const float w[3], float side, float behind)
+/* Whether a ray from p in direction w, in the frame of the rectangle, meets its quadric within its sides, from `side`. It
+ * is met where A t^2 + B t + C is 0; of its roots each has its side. */
+static int meets(const struct rectangle *r, const float p[3], const float w[3], float side, float behind)
 {
-	const float *l = lid->lambda;
+	const float l[2] = { r->lambda_u, r->lambda_u * r->rho };
 	const float a = 0.5f * (l[0] * w[0] * w[0] + l[1] * w[1] * w[1]);
 	const float b = l[0] * p[0] * w[0] + l[1] * p[1] * w[1] - w[2];
-	const float c = quadric_at(lid, p[0], p[1]) - p[2], inside = b * b - 4 * a * c;
+	const float c = dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1]) - p[2], inside = b * b - 4 * a * c;
 	float root, t;
 
 	if (inside < 0)
 		return 0;
 	root = side * sqrtf(inside);
 	t = side * b <= 0 ? 2 * c / (root - b) : (-b - root) / (2 * a);
-	return t >= -behind && fabsf(p[0] + t * w[0]) <= lid->extent[0] && fabsf(p[1] + t * w[1]) <= lid->extent[1];
+	return t >= -behind && fabsf(p[0] + t * w[0]) <= r->extent[0] && fabsf(p[1] + t * w[1]) <= r->extent[1];
 }
 
 /* Whether the lid is in the way of the ray that comes from `from` to the place. */
@@ -142,8 +130,8 @@ static int stops(const struct lid *lid, const float p[3], const float from[3], f
 {
 	float w[3];
 
-	m3f_apply(w, (const float (*)[3])lid->axis, from);
-	return meets(lid, p, w, 1, behind) || (lid->is_two_sided && meets(lid, p, w, -1, behind));
+	m3f_apply(w, (const float (*)[3])lid->rectangle.axis, from);
+	return meets(&lid->rectangle, p, w, 1, behind) || (lid->is_two_sided && meets(&lid->rectangle, p, w, -1, behind));
 }
 
 static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, const float at[3],
@@ -152,21 +140,19 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 	int n_open = DIRECTIONS;
 	uint8_t is_stopped[DIRECTIONS] = { 0 };
 
-	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
-		const struct lid *lid = &s->lid[nearby->lid[i]];
-		float away[3], p[3];
+	for (size_t i = 0; i < nearby->n; i++) {
+		const struct rectangle *r = &s->lid[nearby->lid[i]].rectangle;
+		float p[3];
 
-		v3f_sub(away, at, lid->at);
-		m3f_apply(p, (const float (*)[3])lid->axis, away);
-		if (stops_all(lid, p, normal, s->behind))
+		rectangle_sees(p, r, at);
+		if (stops_all(r, p, normal, s->behind))
 			return 1;
 	}
 	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
 		const struct lid *lid = &s->lid[nearby->lid[i]];
-		float away[3], p[3];
+		float p[3];
 
-		v3f_sub(away, at, lid->at);
-		m3f_apply(p, (const float (*)[3])lid->axis, away);
+		rectangle_sees(p, &lid->rectangle, at);
 		for (int d = 0; d < DIRECTIONS; d++)
 			if (!is_stopped[d] && stops(lid, p, from[d], s->behind)) {
 				is_stopped[d] = 1;
@@ -207,8 +193,7 @@ static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at
 
 	if (cell->part == DPOINT_BEYOND || !directions(from, s, cell))
 		return 1;
-	for (int k = 0; k < 3; k++)
-		middle[k] = 0.25f * (cell->corner[0][k] + cell->corner[1][k] + cell->corner[2][k] + cell->corner[3][k]);
+	dpoint_cell_middle(middle, cell);
 	for (int c = 0; c < 4; c++) {
 		v3f_sub(away, cell->corner[c], middle);
 		radius = fmaxf(radius, v3f_length(away));

@@ -17,6 +17,12 @@ struct dpoint_cell {
 	uint64_t attr;     /* of points in it, without a normal */
 };
 
+static inline void dpoint_cell_middle(float m[3], const struct dpoint_cell *cell)
+{
+	for (int k = 0; k < 3; k++)
+		m[k] = 0.25f * (cell->corner[0][k] + cell->corner[1][k] + cell->corner[2][k] + cell->corner[3][k]);
+}
+
 /* The part of a cell that is no surface: the strip beside a border, which no rectangle may be over (dpoint_fit()), and
  * none covers. */
 #define DPOINT_BEYOND (UINT32_MAX - 1)

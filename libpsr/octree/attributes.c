@@ -255,9 +255,7 @@ static void code_color(struct job *job, uint32_t leaf)
 
 static uint32_t get_material(const struct job *job, uint32_t leaf)
 {
-	const uint8_t *at = job->attributes.material[leaf];
-
-	return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+	return octree_get_material(job->attributes.material[leaf]);
 }
 
 /* Codes each part by how far it is from the mean of the neighbours', round its end. */
@@ -308,8 +306,7 @@ static void code_material(struct job *job, uint32_t leaf)
 	job->was_same = (int)coder_adaptive(job->coder, job->is_decoding, p, 5, material == before);
 	material = job->was_same ? before : code_parts(job, material, before);
 	if (job->is_decoding)
-		for (int i = 0; i < 3; i++)
-			job->attributes.material[leaf][i] = (uint8_t)(material >> 8 * i);
+		octree_put_material(job->attributes.material[leaf], material);
 }
 
 /* ---- all ---- */

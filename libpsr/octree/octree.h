@@ -104,13 +104,18 @@ void octree_mean_color(uint8_t mean[3], const uint8_t (*color)[3], unsigned n); 
  * code: the node's, which lists its children. */
 unsigned octree_mean_offset(unsigned code, uint16_t mean, const uint16_t *normal, const uint8_t *offset);
 
+static inline uint32_t octree_get_material(const uint8_t at[3])
+{
+	return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+}
+
 /* Returns a leaf's material, bits 40 to 63 of a sample's attributes. */
 static inline uint32_t octree_material(const struct octree *tree, uint64_t leaf)
 {
 	const uint8_t *one = tree->one_material != NULL ? *tree->one_material : NULL;
 	const uint8_t *at = tree->material != NULL ? tree->material[leaf] : one;
 
-	return at != NULL ? at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 : OCTREE_MATTE;
+	return at != NULL ? octree_get_material(at) : OCTREE_MATTE;
 }
 
 static inline void octree_put_material(uint8_t at[3], uint32_t material)

@@ -111,15 +111,6 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 
 /* ---- runs of which the bound tells enough ---- */
 
-/* The smallest k >= 0 with pixels <= 2^k, as the kernel has it. */
-static int32_t level_of(float pixels)
-{
-	const int32_t bits = (int32_t)psr_bits_from_float(pixels < 0x1p100f ? pixels : 0x1p100f);
-	const int32_t exponent = ((bits + 0x7fffff) >> 23) - 127;
-
-	return exponent > 0 ? exponent : 0;
-}
-
 /* How many pixels a unit of length spans at most and at least, in the spheres of cubes in this one, whose middles are
  * before the eye: |p| / z'^2 (cull_stretch()). */
 static void find_stretch(float stretch[2], const struct cull_view *v, const struct cull_sphere *s)
@@ -157,8 +148,8 @@ static int find_all_alike(struct alike *out, float stretch[2], const struct plan
 	if (level->tree->is_cloud || !(sphere->c[2] - sphere->r > plan->near_z))
 		return 0;
 	find_stretch(stretch, v, sphere);
-	out->level = level_of(stretch[0] * spacing * (1 - 0x1p-12f));
-	if (out->level != level_of(stretch[1] * spacing * (1 - 0x1p-12f)) || out->level > PSR_MAX_DEPTH_LEVEL)
+	out->level = cull_level(stretch[0] * spacing * CULL_LESS);
+	if (out->level != cull_level(stretch[1] * spacing * CULL_LESS) || out->level > PSR_MAX_DEPTH_LEVEL)
 		return 0;
 	cull_bound_sphere(bound, plan, sphere);
 	const float band = (float)(1u << out->level) + 2;

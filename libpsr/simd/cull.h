@@ -25,6 +25,18 @@ struct cull_view {
 	float region_from[2], region_scale[2];
 };
 
+/* Returns the depth buffer's level for samples that are so far apart: the smallest k >= 0 with pixels <= 2^k ([G] 7.11),
+ * from the exponent. Pixels are a stretch times a spacing times CULL_LESS: so rounding does not double the cells of a
+ * picture at exactly the magnification of a level. Of NaN, 0 times infinity, k is that of 2^100. */
+#define CULL_LESS (1 - 0x1p-12f)
+static inline int32_t cull_level(float pixels)
+{
+	const int32_t bits = (int32_t)psr_bits_from_float(psr_choose(pixels < 0x1p100f, pixels, 0x1p100f));
+	const int32_t exponent = ((bits + 0x7fffff) >> 23) - 127;
+
+	return exponent > 0 ? exponent : 0;
+}
+
 /* Bounds how many pixels a unit of length on a surface inside a sphere can span: |d(x'/z')| <= |p| |dp| / z'^2, which
  * is [G] (7.9) with the true stretch off the axis. With theta the angle between p and the axis that is
  * 1 / (z' cos theta); the sphere's least z' and greatest theta bound it. Seen from within the sphere, or beyond 90

@@ -21,7 +21,6 @@ struct building {
 
 void building_say(const struct building *b, const char *stage);
 struct dpoint_cover_options building_cover(const struct dpoint_build_options *options);
-float building_delta(const struct dpoint_build_options *options); /* of a class */
 
 /* Fills the surface with a cloud's points, and finds sides. LIMIT, FORMAT, MEMORY. */
 int building_put_cloud(struct building *b);

@@ -60,7 +60,7 @@ static int put(struct building *b, const struct cloud *tree, const struct points
 		                                p->radius, tree->near, p->part, p->attr };
 	const struct dpoint_cover_options cover = building_cover(b->options);
 	struct dpoint_cloud_report report;
-	int rc = dpoint_sample_cloud(&b->surface, &report, &cloud, &cover, building_delta(b->options), b->options->pool);
+	int rc = dpoint_sample_cloud(&b->surface, &report, &cloud, &cover, cover.delta, b->options->pool);
 
 	if (rc == PSR_OK && report.n_flat == tree->n)
 		return psr_fail(b->err, PSR_ERR_FORMAT, "no point of %u has a surface around it, of seven points that are not on a"

@@ -106,11 +106,19 @@ static float sine_of(const struct dpoint_build_options *o, double error)
 	return fminf(dpoint_sine(o->epsilon), (float)sqrt(error / (0.059 * 0.25)));
 }
 
+/* A normal is packed within 0.23 degrees, so a flat rectangle of 250 errors ends one error off. */
+static float delta_of(const struct dpoint_build_options *o)
+{
+	const double most = o->error > 0 ? fmin(o->delta, 250 * o->error * pixel_of(o)) : o->delta;
+
+	return dpoint_delta_of_class(dpoint_delta_class((float)most));
+}
+
 struct dpoint_cover_options building_cover(const struct dpoint_build_options *o)
 {
 	struct dpoint_cover_options cover = {
 		.sine = dpoint_sine(o->epsilon), .slack = SLACK, .angle = (float)(o->degrees * PSR_DEGREE),
-		.height = (float)o->height, .overhang = OVERHANG, .looks = BUILDING_LOOKS,
+		.height = (float)o->height, .overhang = OVERHANG, .looks = BUILDING_LOOKS, .delta = delta_of(o),
 	};
 
 	if (o->error > 0) {
@@ -122,21 +130,13 @@ struct dpoint_cover_options building_cover(const struct dpoint_build_options *o)
 	return cover;
 }
 
-/* A normal is packed within 0.23 degrees, so a flat rectangle of 250 errors ends one error off. */
-float building_delta(const struct dpoint_build_options *o)
-{
-	const double most = o->error > 0 ? fmin(o->delta, 250 * o->error * pixel_of(o)) : o->delta;
-
-	return dpoint_delta_of_class(dpoint_delta_class((float)most));
-}
-
 /* A patch looks as its first triangle does; one whose triangles are all without an area has no look, and nothing to
  * cover. */
 static int put_patches(struct building *b, const struct dpoint_cover_options *cover)
 {
 	struct dpoint_trimmed_options o = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = b->options->piece, .turn = 0.5 * (double)cover->sine, .delta = building_delta(b->options),
+		.cell = b->options->piece, .turn = 0.5 * (double)cover->sine, .delta = cover->delta,
 		.hem = (double)fminf(HEM, 0.5f * cover->overhang),
 	};
 	uint32_t *first = malloc(b->mesh->n_patches * sizeof *first);
@@ -162,7 +162,7 @@ static int put_mesh(struct building *b)
 	const struct dpoint_cover_options cover = building_cover(o);
 	const struct dpoint_mesh_options mesh = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = o->piece, .delta = building_delta(o), .grain_of = b->grain,
+		.cell = o->piece, .delta = cover.delta, .grain_of = b->grain,
 		.cover = &cover,
 		.looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
 	};
@@ -204,7 +204,6 @@ int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, st
 	struct dpoint_bounds bounds;
 	int rc;
 
-	cover_options.delta = building_delta(options);
 	cover_options.margin = surface->margin;
 	cover_options.is_two_sided = two_sided;
 	rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);

@@ -90,12 +90,9 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 		const float cz = ((v.center_m[2][0] * x + v.center_m[2][1] * y) + v.center_m[2][2] * z) + v.center_m[2][3];
 		const float stretch = cull_stretch(&v, cx, cy, cz, r, cz - r);
 
-		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent. A tolerance of 1/4096 keeps rounding from
-		 * doubling the cells of a picture at exactly the magnification of a level. */
 		const float spacing = v.spacing * psr_float_from_bits((uint32_t)(127 + (flags & PSR_BLOCK_LEVEL)) << 23);
-		const float pixels = stretch * spacing * (1 - 0x1p-12f); /* may be NaN: 0 times infinity */
-		const int32_t bits = (int32_t)psr_bits_from_float(psr_choose(pixels < 0x1p100f, pixels, 0x1p100f));
-		const int32_t exponent = ((bits + 0x7fffff) >> 23) - 127, level = exponent > 0 ? exponent : 0;
+		const float pixels = stretch * spacing * CULL_LESS; /* may be NaN */
+		const int32_t level = cull_level(pixels);
 		const int32_t used = level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL;
 
 		/* Two pixels beyond the guard band's cell cover rounding. */
