@@ -108,8 +108,8 @@ static int stops_all(const struct rectangle *r, const float p[3], const float no
 	       fabsf(p[1]) + reach <= r->extent[1];
 }
 
-/* Whether a ray from p in direction w, in the frame of the rectangle, meets its quadric within its sides, from `side`. It
- * is met where A t^2 + B t + C is 0; of its roots each has its side. */
+/* Whether a ray from p in direction w, in the frame of the rectangle, meets its quadric within its sides, from `side`.
+ * It is met where A t^2 + B t + C is 0; of its roots each has its side. */
 static int meets(const struct rectangle *r, const float p[3], const float w[3], float side, float behind)
 {
 	const float l[2] = { r->lambda_u, r->lambda_u * r->rho };

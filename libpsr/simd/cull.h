@@ -25,8 +25,8 @@ struct cull_view {
 	float region_from[2], region_scale[2];
 };
 
-/* Returns the depth buffer's level for samples that are so far apart: the smallest k >= 0 with pixels <= 2^k ([G] 7.11),
- * from the exponent. Pixels are a stretch times a spacing times CULL_LESS: so rounding does not double the cells of a
+/* Returns the depth buffer's level for samples that are so far apart: the smallest k >= 0 with pixels <= 2^k ([G]
+ * 7.11), from the exponent. Pixels are a stretch times a spacing times CULL_LESS: so rounding does not double the cells of a
  * picture at exactly the magnification of a level. Of NaN, 0 times infinity, k is that of 2^100. */
 #define CULL_LESS (1 - 0x1p-12f)
 static inline int32_t cull_level(float pixels)
