@@ -32,7 +32,9 @@ struct psr_cube_bound {
 	float center[3], radius;
 	int8_t axis[3];
 	uint8_t sine; /* PSR_CONE_ANY without cones */
+	uint8_t width; /* the level in its cubes' flags; PSR_CUBE_WIDTHS where these have several */
 };
+#define PSR_CUBE_WIDTHS 255
 
 struct psr_cube_level {
 	const struct octree *tree; /* of level 0 the model's; each further one has a level less, and averaged attributes */

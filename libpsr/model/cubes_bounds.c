@@ -70,6 +70,16 @@ static void bound_cone(struct psr_cube_bound *bound, const struct psr_blocks *b,
 	bound->sine = (uint8_t)sine;
 }
 
+static uint8_t width_of(const struct psr_blocks *b, uint32_t first, uint32_t end)
+{
+	const uint32_t width = psr_blocks_level(b, first);
+
+	for (uint32_t i = first + 1; i < end; i++)
+		if (psr_blocks_level(b, i) != width)
+			return PSR_CUBE_WIDTHS;
+	return (uint8_t)width;
+}
+
 void cubes_bound_task(int task, void *userdata)
 {
 	const struct cubes_making *m = userdata;
@@ -84,7 +94,7 @@ void cubes_bound_task(int task, void *userdata)
 
 			struct psr_cube_bound *bound = &m->bound[l][r];
 
-			*bound = (struct psr_cube_bound){ .sine = PSR_CONE_ANY };
+			*bound = (struct psr_cube_bound){ .sine = PSR_CONE_ANY, .width = width_of(&m->cubes->groups, first, end) };
 			bound_sphere(bound, m->cubes, level, first, end);
 			if (m->sine != NULL)
 				bound_cone(bound, &m->cubes->groups, first, end);

@@ -9,11 +9,6 @@
 /* Two passes over chunks of blocks: the first tests each block and counts entries by tile; the second writes the bins
  * at places that follow from the counts, in the same order for any number of threads. */
 
-/* Blocks of a chunk; some tens of chunks give threads enough to share. */
-#define LEAST_CHUNK 256
-#define MOST_CHUNK 2048
-#define MANY_CHUNKS 64
-
 struct cull {
 	struct bins *bins;
 	const struct simd *simd;
@@ -126,8 +121,8 @@ static void count_chunk(int i, void *userdata)
 	struct cull_chunk chunk = cull->bins->chunk[i];
 	const struct plan_instance *in = &plan->instance[chunk.instance];
 	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
-	struct cull_hit hit[MOST_CHUNK];
-	uint64_t cubes[MOST_CHUNK];
+	struct cull_hit hit[CULL_MOST_CHUNK];
+	uint64_t cubes[CULL_MOST_CHUNK];
 	struct cull_counting to = { cull->bins, cull->simd, plan, &chunk, count, hit, plan->with_runs ? cubes : NULL };
 
 	memset(count, 0, cull->n_tiles * sizeof *count);
@@ -194,29 +189,6 @@ static void fill_chunk(int i, void *userdata)
 	}
 }
 
-static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int store)
-{
-	const uint32_t share = plan->n_slots / MANY_CHUNKS, least = share > LEAST_CHUNK ? share : LEAST_CHUNK;
-	const uint32_t most = least < MOST_CHUNK ? least : MOST_CHUNK;
-	uint32_t n = 0;
-
-	for (uint32_t i = 0; i < plan->n_instances && !plan_is_cancelled(plan); i++) {
-		const struct psr_blocks *blocks = plan->instance[i].cull.blocks;
-		uint32_t k = 0;
-
-		for (uint32_t first = 0; first < blocks->n_blocks; first += most, n++) {
-			const uint32_t left = blocks->n_blocks - first;
-
-			while (blocks->cluster[k].first_block + blocks->cluster[k].n_blocks <= first)
-				k++;
-			if (store)
-				bins->chunk[n] = (struct cull_chunk){ .instance = i, .first_cluster = k, .first_block = first,
-					                                  .n_blocks = left < most ? left : most };
-		}
-	}
-	return n;
-}
-
 static int compare_keys(const void *a, const void *b)
 {
 	const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
@@ -273,9 +245,7 @@ static int make_room(struct bins *bins, const struct cull *cull)
 {
 	const struct plan *plan = cull->plan;
 
-	return bins_room(bins, chunk, cull->n_chunks) && bins_room(bins, hit, plan->n_slots)
-	               && (!plan->with_runs || bins_room(bins, cubes, plan->n_slots))
-	               && bins_room(bins, group, plan->n_groups)
+	return bins_room(bins, hit, plan->n_slots) && (!plan->with_runs || bins_room(bins, cubes, plan->n_slots))
 	               && bins_room(bins, count, (size_t)cull->n_chunks * cull->stride)
 	               && bins_room(bins, tile_begin, cull->n_tiles + 1) && bins_room(bins, by_work, cull->n_tiles)
 	               && bins_room(bins, is_quiet, plan->parts_x * plan->parts_y)
@@ -347,14 +317,18 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 {
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
 	const uint32_t stride = (n_tiles + line - 1) / line * line;
-	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, stride, 0 };
-	int rc = plan_is_cancelled(plan) ? PSR_ERR_CANCELLED : make_room(bins, &cull);
+	struct cull cull = { bins, simd, plan, 0, n_tiles, stride, 0 };
+	int rc = bins_room(bins, group, plan->n_groups) ? PSR_OK : PSR_ERR_MEMORY;
 
+	if (rc == PSR_OK)
+		rc = cull_choose_levels(bins, plan, pool);
+	if (rc == PSR_OK)
+		rc = cull_make_chunks(bins, plan, &cull.n_chunks);
+	if (rc == PSR_OK)
+		rc = make_room(bins, &cull);
 	if (rc)
 		return rc;
 	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
-	make_chunks(bins, plan, 1);
-	cull_choose_levels(bins, plan);
 	for (uint32_t i = 0; i < plan->n_instances && !plan_is_cancelled(plan); i++)
 		if (plan->instance[i].masks == PSR_WHY_RAN)
 			cull_masks_make(&bins->masks[i], plan, &plan->instance[i]);

@@ -10,7 +10,10 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 
 /* ---- for the files of the cull ---- */
 
-/* n_drawn: blocks or cubes, where n_hits are entries of runs. */
+#define CULL_MOST_CHUNK 2048 /* blocks, or chosen cubes, of a chunk */
+
+/* Blocks first_block .. first_block + n_blocks - 1, of cubes of one level the chosen ones among these; first_cluster holds
+ * the first. n_drawn: blocks or cubes, where n_hits are entries of runs. */
 struct cull_chunk {
 	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits, n_drawn;
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
@@ -43,12 +46,16 @@ void cull_count_runs(struct cull_counting *to);
 struct cull_group {
 	uint8_t level; /* of the cluster that is drawn */
 	uint8_t fits;
+	uint8_t is_out; /* of cubes: nothing of it is in view */
 };
 
 static inline int cull_is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
 {
 	return bins->group[in->first_group + k->group].level == k->level;
 }
+
+/* Makes the chunks, given levels. MEMORY, CANCELLED. */
+int cull_make_chunks(struct bins *bins, const struct plan *plan, uint32_t *n_chunks);
 
 /* Counts ones; __builtin_popcountll is a library call where the compiler cannot assume the instruction. */
 static inline uint32_t cull_count_bits(uint64_t word)
@@ -100,8 +107,8 @@ int cull_sees_run(const struct plan *plan, const struct plan_instance *in, uint3
 /* Chooses of each group of clusters the coarsest level whose level_spacing is at most a pixel, or the settings'
  * spacing, where its blocks are nearest. Blocks of such a level need no depth buffer but the picture's, cubes one of
  * 2x2 pixels at most. The finest level if none fits.
- * Returns early if the frame is cancelled. */
-void cull_choose_levels(struct bins *bins, const struct plan *plan);
+ * CANCELLED. */
+int cull_choose_levels(struct bins *bins, const struct plan *plan, struct psr_pool *pool);
 
 /* How far what a block draws may be from the surface, in pixels: a sample from the surface, and what it draws from the
  * sample. apart, depth_error: as the kernel has them. */

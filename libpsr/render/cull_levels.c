@@ -2,6 +2,9 @@
 #include <string.h>
 #include "cull.h"
 
+#define GROUPS_TASK 256 /* groups of cubes for a thread at a time, some ten microseconds */
+#define ROUNDING 1e-3f  /* more than what floats are off by, of what is compared with cubes' */
+
 static inline float to_camera(const float m[4], float x, float y, float z)
 {
 	return m[0] * x + m[1] * y + m[2] * z + m[3];
@@ -97,31 +100,63 @@ static void choose_of_blocks(struct cull_group *group, const struct plan *plan, 
 		}
 }
 
-/* Each level has a cluster of each group, in the order of groups. Out of view any level will do. */
-static void choose_of_cubes(struct cull_group *group, const struct plan *plan, const struct plan_instance *in)
-{
-	const struct psr_blocks *b = in->cull.blocks;
-	const uint32_t n_groups = b->n_clusters / b->n_levels;
+/* ---- cubes: each level has a cluster of each group, in the order of groups ---- */
 
-	for (uint32_t i = 0; i < n_groups && !plan_is_cancelled_at(plan, i); i++) {
+/* Returns a level above which none fits: where a unit of length spans least pixels, at a group's farthest, samples are more
+ * than a pixel apart already. What is before the eye only in part tells nothing. */
+static unsigned coarsest_of(const struct plan *plan, const struct plan_instance *in, const struct cull_sphere *v,
+                            unsigned level)
+{
+	const float far = plan->perspective ? v->c[2] + v->r : 1;
+	const float pixels = in->cull.focal / far * in->level_spacing * plan->finer * (1 - ROUNDING);
+
+	if (plan->perspective && !(v->c[2] - v->r > plan->near_z))
+		return level;
+	while (level > 0 && pixels * (float)(1u << level) > 1)
+		level--;
+	return level;
+}
+
+struct choosing {
+	struct cull_group *group;
+	const struct plan *plan;
+	const struct plan_instance *in;
+};
+
+/* Out of view any level will do. */
+static void choose_of_cubes(int task, void *userdata)
+{
+	const struct choosing *c = userdata;
+	const struct psr_blocks *b = c->in->cull.blocks;
+	const uint32_t n_groups = b->n_clusters / b->n_levels, first = (uint32_t)task * GROUPS_TASK;
+	const uint32_t end = n_groups - first < GROUPS_TASK ? n_groups : first + GROUPS_TASK;
+
+	for (uint32_t i = first; i < end; i++) {
 		const struct psr_cluster *own = &b->cluster[i];
 		unsigned level = b->n_levels - 1;
-		const struct cull_sphere v = cull_view_cluster(in, &own[level * n_groups]);
+		const struct cull_sphere v = cull_view_cluster(c->in, &own[level * n_groups]);
+		const int is_out = !cull_sees_sphere(c->plan, &v);
 
-		if (!cull_sees_sphere(plan, &v))
-			level = 0;
-		while (level > 0 && !fits_cluster(plan, in, &own[level * n_groups]))
+		level = is_out ? 0 : coarsest_of(c->plan, c->in, &v, level);
+		while (level > 0 && !fits_cluster(c->plan, c->in, &own[level * n_groups]))
 			level--;
-		group[i] = (struct cull_group){ .level = (uint8_t)level, .fits = level > 0 };
+		c->group[i] = (struct cull_group){ .level = (uint8_t)level, .fits = level > 0, .is_out = (uint8_t)is_out };
 	}
 }
 
-/* Serial, since most clusters take some nanoseconds. */
-void cull_choose_levels(struct bins *bins, const struct plan *plan)
+int cull_choose_levels(struct bins *bins, const struct plan *plan, struct psr_pool *pool)
 {
-	for (uint32_t i = 0; i < plan->n_instances; i++) {
+	for (uint32_t i = 0; i < plan->n_instances && !plan_is_cancelled(plan); i++) {
 		const struct plan_instance *in = &plan->instance[i];
+		const struct psr_blocks *b = in->cull.blocks;
+		struct choosing c = { bins->group + in->first_group, plan, in };
 
-		(in->cull.cubes != NULL ? choose_of_cubes : choose_of_blocks)(bins->group + in->first_group, plan, in);
+		if (in->cull.cubes == NULL) {
+			choose_of_blocks(c.group, plan, in);
+			continue;
+		}
+		const uint32_t n_tasks = (b->n_clusters / b->n_levels + GROUPS_TASK - 1) / GROUPS_TASK;
+		psr_pool_for_until(n_tasks > 1 ? pool : NULL, &plan->cancel, (int)n_tasks, choose_of_cubes, &c);
 	}
+	return plan_is_cancelled(plan) ? PSR_ERR_CANCELLED : PSR_OK;
 }

@@ -138,14 +138,14 @@ static int find_side(int32_t side[2], const float bound[2], float band, float si
 
 /* Returns whether all cubes of a run are in the picture, within one tile, and need the depth buffer of one level. */
 static int find_all_alike(struct alike *out, float stretch[2], const struct plan *plan, const struct plan_instance *in,
-                          const struct psr_cube_level *level, const struct cull_sphere *sphere)
+                          const struct psr_cube_bound *run, const struct cull_sphere *sphere)
 {
 	const struct cull_view *v = &in->cull;
-	const float spacing = v->spacing * (float)(1u << (level - in->cull.cubes->level));
+	const float spacing = v->spacing * (float)(1u << run->width);
 	float bound[2][2];
 	int32_t tile_x, tile_y;
 
-	if (level->tree->is_cloud || !(sphere->c[2] - sphere->r > plan->near_z))
+	if (run->width == PSR_CUBE_WIDTHS || !(sphere->c[2] - sphere->r > plan->near_z))
 		return 0;
 	find_stretch(stretch, v, sphere);
 	out->level = cull_level(stretch[0] * spacing * CULL_LESS);
@@ -179,7 +179,7 @@ static void take_run(struct cull_counting *to, uint32_t first, uint32_t n, uint6
 	if (facing == CULL_AWAY)
 		return;
 	to->chunk->n_tested += cull_count_bits(chosen);
-	if (!find_all_alike(&alike, stretch, plan, in, level, &sphere)) {
+	if (!find_all_alike(&alike, stretch, plan, in, bound, &sphere)) {
 		to->simd->cull(&batch, &in->cull, first, n);
 		take_batch(to, &batch, first, chosen);
 		return;
@@ -192,34 +192,55 @@ static void take_run(struct cull_counting *to, uint32_t first, uint32_t n, uint6
 	put_hit(to, &alike, first, mixed, 1);
 	put_hit(to, &alike, first, left & ~mixed, 0);
 	if (left)
-		note_run(to, first, left, mixed, stretch[0] * in->cull.spacing * (float)(1u << (level - in->cull.cubes->level)),
+		note_run(to, first, left, mixed, stretch[0] * in->cull.spacing * (float)(1u << bound->width),
 		         stretch[0] * in->cull.scale * (float)(level->edge * (CUBES_DIAGONAL / 2)));
 }
 
+/* The cubes of a run that are drawn. */
+struct chosen {
+	uint32_t first; /* the run's; UINT32_MAX: none yet */
+	uint64_t cubes;
+};
+
+static void take_chosen(struct cull_counting *to, const struct psr_cube_level *level, const struct chosen *run)
+{
+	const uint32_t left = run->cubes ? level->first + level->n - run->first : 0;
+
+	if (left > 0 && !plan_is_cancelled(to->plan))
+		take_run(to, run->first, left < CUBES_RUN ? left : CUBES_RUN, run->cubes);
+}
+
+/* A chunk is of one level, whose clusters are in the order of groups. */
 void cull_count_runs(struct cull_counting *to)
 {
-	const struct plan_instance *in = &to->plan->instance[to->chunk->instance];
-	const struct psr_blocks *b = in->cull.blocks;
-	const uint32_t end = to->chunk->first_block + to->chunk->n_blocks;
-	uint32_t k = to->chunk->first_cluster;
+	const struct cull_chunk *chunk = to->chunk;
+	const struct plan_instance *in = &to->plan->instance[chunk->instance];
+	const struct psr_cube_level *level = psr_cubes_level(in->cull.cubes, chunk->first_block);
+	const struct psr_cluster *cluster = in->cull.blocks->cluster;
+	const struct cull_group *group = to->bins->group + in->first_group;
+	const uint32_t end = chunk->first_block + chunk->n_blocks, l = (uint32_t)(level - in->cull.cubes->level);
+	const uint32_t n_groups = in->cull.blocks->n_clusters / in->cull.blocks->n_levels, of_level = l * n_groups;
+	struct chosen run = { UINT32_MAX, 0 };
 
-	for (uint32_t first = to->chunk->first_block, n; first < end && !plan_is_cancelled(to->plan); first += n) {
-		const struct psr_cube_level *level = psr_cubes_level(in->cull.cubes, first);
-		const uint32_t level_end = level->first + level->n;
-		uint64_t chosen = 0;
+	for (uint32_t g = chunk->first_cluster - of_level, next; g < n_groups; g++) {
+		const struct psr_cluster *k = &cluster[of_level + g];
 
-		n = cull_next_batch(in, first, end < level_end ? end : level_end);
-		while (b->cluster[k].first_block + b->cluster[k].n_blocks <= first)
-			k++;
-		for (uint32_t i = k; i < b->n_clusters && b->cluster[i].first_block < first + n; i++) {
-			const uint32_t begin = b->cluster[i].first_block, own_end = begin + b->cluster[i].n_blocks;
-			const uint64_t from = UINT64_MAX << (begin > first ? begin - first : 0);
+		if (group[g].level != l || group[g].is_out)
+			continue;
+		if (k->first_block >= end)
+			break;
+		uint32_t first = k->first_block > chunk->first_block ? k->first_block : chunk->first_block;
+		const uint32_t own_end = k->first_block + k->n_blocks < end ? k->first_block + k->n_blocks : end;
+		for (; first < own_end; first = next) {
+			const uint32_t in_run = (first - level->first) % CUBES_RUN, begin = first - in_run;
 
-			if (cull_is_chosen(to->bins, in, &b->cluster[i]))
-				chosen |= own_end < first + n ? from & ~(UINT64_MAX << (own_end - first)) : from;
+			next = own_end - begin < CUBES_RUN ? own_end : begin + CUBES_RUN;
+			if (begin != run.first) {
+				take_chosen(to, level, &run);
+				run = (struct chosen){ begin, 0 };
+			}
+			run.cubes |= UINT64_MAX >> (CUBES_RUN - (next - first)) << in_run;
 		}
-		chosen &= n < CUBES_RUN ? ~(UINT64_MAX << n) : UINT64_MAX;
-		if (chosen)
-			take_run(to, first, n, chosen);
 	}
+	take_chosen(to, level, &run);
 }

@@ -247,7 +247,7 @@ static void count(struct survey *survey, struct surveyor *s, const double *densi
 	s->n_spots = 0;
 	s->n_in_view = s->apart2 = s->spread = 0;
 	s->plan.finer = 1;
-	cull_choose_levels(&s->bins, &s->plan);
+	cull_choose_levels(&s->bins, &s->plan, NULL);
 	for (uint64_t left = each_drawn(s, NULL, 0, 1); left > MOST_BLOCKS; left /= 2)
 		stride *= 2;
 	each_drawn(s, NULL, stride, 1);
@@ -259,7 +259,7 @@ static void count(struct survey *survey, struct surveyor *s, const double *densi
 
 		*counts = (struct survey_counts){ 0, 0, 0 };
 		s->plan.finer = (float)density[i];
-		cull_choose_levels(&s->bins, &s->plan);
+		cull_choose_levels(&s->bins, &s->plan, NULL);
 		each_drawn(s, counts, 0, density[i]);
 	}
 }

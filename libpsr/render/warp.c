@@ -1,3 +1,4 @@
+#include <math.h>
 #include "cull.h"
 #include "sheer.h"
 #include "warp.h"
@@ -115,15 +116,24 @@ int warp_looks(const struct plan *plan, uint32_t n)
 	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least || plan->is_full);
 }
 
-/* How many blocks, cubes or groups of points entries stand for. */
+/* As how many blocks, groups of points or cubes of a surface a tile's entries are: a cube of a surface has sixteen
+ * leaves in the mean, one of a sparse cloud a few. */
 static uint32_t n_blocks_of(const struct warp_target *t, const struct bin_entry *entry, uint32_t n_entries)
 {
-	uint32_t n = n_entries;
+	const struct psr_blocks *last = NULL;
+	float n = 0, share = 1;
 
-	for (uint32_t e = 0; t->cubes != NULL && e < n_entries; e++)
-		if (t->instance[entry[e].instance].cubes != NULL)
-			n += cull_count_bits(t->cubes[entry[e].hit]) - 1;
-	return n;
+	for (uint32_t e = 0; e < n_entries; e++) {
+		const struct warp_instance *in = &t->instance[entry[e].instance];
+		const int is_run = in->cubes != NULL && t->cubes != NULL;
+
+		if (in->cubes != NULL && in->blocks != last) {
+			last = in->blocks;
+			share = fminf((float)last->n_samples / (16 * (float)last->n_blocks), 1);
+		}
+		n += in->cubes != NULL ? share * (float)(is_run ? cull_count_bits(t->cubes[entry[e].hit]) : 1) : 1;
+	}
+	return (uint32_t)n;
 }
 
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,

@@ -22,8 +22,10 @@ struct strip_pixels {
 	uint32_t has_sample[STRIP / 32]; /* bit x % 32 of has_sample[x / 32]: pixel x is among them */
 	uint16_t x[STRIP + STRIP_PADDING];
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
-	const uint64_t *at[STRIP];          /* attributes */
-	uint64_t leaf[STRIP];               /* those of leaves, in the form of attributes */
+	const uint64_t *at[STRIP];          /* attributes; NULL: those of leaf[i] of tree[i] */
+	const struct octree *tree[STRIP];
+	uint32_t leaf[STRIP];
+	int has_leaves;                     /* an element of `at` is NULL */
 	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
 	uint32_t has_cones;   /* a sample's block is bent; with STRIP_BENT, where the surface's normal is needed */
 	uint32_t cone[STRIP]; /* then, of bent blocks: x, y, z and sine, from the lowest byte on; else STRIP_NO_CONE */

@@ -45,32 +45,37 @@ static void find_cones(struct strip_pixels *p, const struct strip_view *view)
 	}
 }
 
-/* Finds leaves first, so that reading them overlaps the latencies of memory. */
+/* Step by step, so that each step's reads of memory overlap. */
 static void find_leaves(struct strip_pixels *p, const struct warp_instance *in, uint32_t first, uint32_t end)
 {
 	const struct psr_cubes *cubes = in->cubes->model;
-	const struct octree *tree[STRIP];
-	uint32_t leaf[STRIP];
+	uint32_t code[STRIP];
 
+	p->has_leaves = 1;
+	for (uint32_t i = first; i < end; i++)
+		__builtin_prefetch(&cubes->cube[p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot]);
 	for (uint32_t i = first; i < end; i++) {
 		const uint32_t cube = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot;
 		const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
-		const uint32_t rank = psr_cubes_rank(level->tree, psr_cubes_code(cubes, level, cube),
-		                                     p->id[i] % PSR_BLOCK_SAMPLES);
 
-		tree[i] = level->tree;
-		leaf[i] = psr_cubes_leaf(cubes, level, cube) + rank;
+		p->at[i] = NULL;
+		p->tree[i] = level->tree;
+		code[i] = psr_cubes_code(cubes, level, cube);
+		p->leaf[i] = psr_cubes_leaf(cubes, level, cube);
+		__builtin_prefetch(level->tree->code + code[i]);
 		p->two_sided[i] = cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED;
-		if (tree[i]->normal != NULL)
-			__builtin_prefetch(tree[i]->normal + leaf[i]);
-		if (tree[i]->color != NULL)
-			__builtin_prefetch(tree[i]->color + leaf[i]);
-		if (tree[i]->material != NULL)
-			__builtin_prefetch(tree[i]->material + leaf[i]);
 	}
 	for (uint32_t i = first; i < end; i++) {
-		p->leaf[i] = psr_cubes_attr(tree[i], leaf[i]);
-		p->at[i] = &p->leaf[i];
+		const struct octree *tree = p->tree[i];
+		const uint32_t leaf = p->leaf[i] + psr_cubes_rank(tree, code[i], p->id[i] % PSR_BLOCK_SAMPLES);
+
+		p->leaf[i] = leaf;
+		if (tree->normal != NULL)
+			__builtin_prefetch(tree->normal + leaf);
+		if (tree->color != NULL)
+			__builtin_prefetch(tree->color + leaf);
+		if (tree->material != NULL)
+			__builtin_prefetch(tree->material + leaf);
 	}
 }
 
@@ -91,6 +96,7 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
 
+	p->has_leaves = 0;
 	for (uint32_t i = 0, end; i < n;) {
 		const struct warp_instance *in = instance_run(&end, p, view, i, n);
 		const struct psr_blocks b = *in->blocks;

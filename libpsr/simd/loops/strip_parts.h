@@ -19,6 +19,10 @@ static inline void repeat_last(struct strip_pixels *p)
 		p->x[i] = p->x[p->n - 1];
 		p->id[i] = p->id[p->n - 1];
 		p->at[i] = p->at[p->n - 1];
+		if (p->at[i] == NULL) {
+			p->tree[i] = p->tree[p->n - 1];
+			p->leaf[i] = p->leaf[p->n - 1];
+		}
 		p->two_sided[i] = p->two_sided[p->n - 1];
 		if (p->has_cones)
 			p->cone[i] = p->cone[p->n - 1];
@@ -26,24 +30,33 @@ static inline void repeat_last(struct strip_pixels *p)
 }
 
 /* *all and *common: all attributes or-ed, and and-ed. */
-static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
+static CONSTANT_FLAGS void read_all(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view,
+                                    int has_leaves)
 {
 	const struct strip_pixels *p = strip->pixels;
 	const uint32_t n = strip_whole(p->n);
 	uint64_t some = 0, each = ~UINT64_C(0);
 
 	for (uint32_t i = 0; i < n; i++) {
-		const uint64_t attr = *p->at[i];
+		const uint64_t attr = has_leaves && p->at[i] == NULL ? psr_cubes_attr(p->tree[i], p->leaf[i]) : *p->at[i];
 
 		strip->attr[i] = attr;
 		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
 		some |= attr;
 		each &= attr;
 	}
-	strip->n = n;
-	strip->is_specular = PSR_ATTR_GLOSS(some) || view->needs & STRIP_SPECULAR;
 	*all = some;
 	*common = each;
+}
+
+static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
+{
+	if (strip->pixels->has_leaves)
+		read_all(all, common, strip, view, 1);
+	else
+		read_all(all, common, strip, view, 0);
+	strip->n = strip_whole(strip->pixels->n);
+	strip->is_specular = PSR_ATTR_GLOSS(*all) || view->needs & STRIP_SPECULAR;
 }
 
 /* is_one: the whole strip has one colour, a frequent case. */

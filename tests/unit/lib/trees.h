@@ -12,6 +12,7 @@
 struct tree_options {
 	int levels;
 	double radius;    /* of a sphere about the origin; the cube is -1..1 in each direction */
+	int is_solid;     /* the sphere's inside, too */
 	int is_one_sided;
 	int with_offsets;
 	int with_scan;    /* intensity 30,000 (y + 1); class 2 where x > 0, else 6; return 1 of 1 where z > 0, else 2 of 2 */
@@ -24,8 +25,8 @@ struct tree_making {
 	uint64_t random;
 };
 
-/* Whether a closed cell meets the sphere. */
-static inline int tree_meets(const double low[3], double edge, double r)
+/* Whether a closed cell meets the sphere, or the ball. */
+static inline int tree_meets(const double low[3], double edge, double r, int is_solid)
 {
 	double nearest = 0, farthest = 0;
 
@@ -35,12 +36,12 @@ static inline int tree_meets(const double low[3], double edge, double r)
 		nearest += near * near;
 		farthest += fmax(low[a] * low[a], high * high);
 	}
-	return nearest <= r * r && r * r <= farthest;
+	return nearest <= r * r && (is_solid || r * r <= farthest);
 }
 
 static inline void tree_descend(struct tree_making *m, const double low[3], double edge, uint64_t path, int depth)
 {
-	if (!tree_meets(low, edge, m->options->radius))
+	if (!tree_meets(low, edge, m->options->radius, m->options->is_solid))
 		return;
 	if (depth == m->options->levels) {
 		m->random = m->random * 6364136223846793005u + 1442695040888963407u;

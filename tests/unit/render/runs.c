@@ -113,8 +113,10 @@ static double random_of(uint64_t *state, double low, double high)
 	return low + (high - low) * (double)(*state >> 11) * 0x1p-53;
 }
 
-/* From near, from far and from within; a third of it without perspective. Two instances, one of which is turned. */
-static void check_views(const struct tree_options *options)
+/* From near, from far and from within; a third of it without perspective. Two instances, one of which is turned. Returns
+ * in how many views `check` finds something. */
+static int check_each_view(const struct tree_options *options, int n,
+                           int (*check)(const struct psr_scene *scene, const struct render_settings *settings))
 {
 	struct psr_model *model = tree_build(options);
 	struct psr_instance instance[2] = { { .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 },
@@ -126,7 +128,7 @@ static void check_views(const struct tree_options *options)
 	int n_seen = 0;
 
 	render_settings_default(&settings, WIDTH, HEIGHT);
-	for (int i = 0; i < 45; i++) {
+	for (int i = 0; i < n; i++) {
 		const double distance = exp2(random_of(&state, -2, 4));
 
 		scene.camera = (struct psr_camera){ .up = { 0, 1, 0 }, .fov_y = random_of(&state, 0.2, 1.4) };
@@ -140,10 +142,15 @@ static void check_views(const struct tree_options *options)
 		}
 		settings.cell_bias = i % 4 == 3 ? 1 : 0;
 		settings.cull_tests = i % 5 == 4 ? PSR_CULL_ALL & ~(unsigned)PSR_CULL_CONES : PSR_CULL_ALL;
-		n_seen += check_same(&scene, &settings);
+		n_seen += check(&scene, &settings);
 	}
-	assert_true(n_seen > 30); /* what has one side is not seen from within */
 	psr_model_unref(model);
+	return n_seen;
+}
+
+static void check_views(const struct tree_options *options)
+{
+	assert_true(check_each_view(options, 45, check_same) > 30); /* what has one side is not seen from within */
 }
 
 static void runs_draw_the_cubes_that_single_tests_leave(void **state)
@@ -193,6 +200,78 @@ static void runs_make_a_twentieth_of_the_entries(void **state)
 	psr_model_unref(model);
 }
 
+/* Counts how often each cube is in a chunk, of which a cluster's cubes may be several; and that none of a group out of
+ * view may show. */
+static int check_chunks(const struct psr_scene *scene, const struct render_settings *settings)
+{
+	const struct simd *simd = simd_get();
+	struct plan plan = { 0 };
+	struct bins bins = { 0 };
+	uint32_t n_chunks, n_out = 0;
+
+	assert_int_equal(psr_scene_validate(scene, NULL), PSR_OK);
+	assert_int_equal(plan_make(&plan, scene, settings, NULL), PSR_OK);
+	assert_true(bins_room(&bins, group, plan.n_groups));
+	assert_int_equal(cull_choose_levels(&bins, &plan, NULL), PSR_OK);
+	assert_int_equal(cull_make_chunks(&bins, &plan, &n_chunks), PSR_OK);
+	uint8_t *const n = calloc(plan.n_slots, 1);
+	assert_non_null(n);
+	for (uint32_t c = 0; c < n_chunks; c++) {
+		const struct cull_chunk *chunk = &bins.chunk[c];
+		const struct plan_instance *in = &plan.instance[chunk->instance];
+		const struct psr_blocks *b = in->cull.blocks;
+		const uint32_t end = chunk->first_block + chunk->n_blocks;
+		uint32_t n_cubes = 0;
+
+		for (uint32_t k = chunk->first_cluster; k < b->n_clusters && b->cluster[k].first_block < end; k++) {
+			const uint32_t first = b->cluster[k].first_block, own_end = first + b->cluster[k].n_blocks;
+
+			if (bins.group[in->first_group + b->cluster[k].group].is_out || !cull_is_chosen(&bins, in, &b->cluster[k]))
+				continue;
+			for (uint32_t i = first; i < own_end; i++)
+				if (i >= chunk->first_block && i < end) {
+					n[in->first_slot + i]++;
+					n_cubes++;
+				}
+		}
+		assert_in_range(n_cubes, 1, CULL_MOST_CHUNK);
+	}
+	for (uint32_t i = 0; i < plan.n_instances; i++) {
+		const struct plan_instance *in = &plan.instance[i];
+		const struct psr_blocks *b = in->cull.blocks;
+
+		for (uint32_t k = 0; k < b->n_clusters; k++) {
+			const int is_out = bins.group[in->first_group + b->cluster[k].group].is_out;
+			n_out += (uint32_t)is_out;
+			const int is_drawn = !is_out && cull_is_chosen(&bins, in, &b->cluster[k]);
+
+			for (uint32_t j = 0; j < b->cluster[k].n_blocks; j++) {
+				struct cull_batch batch;
+
+				assert_int_equal(n[in->first_slot + b->cluster[k].first_block + j], is_drawn);
+				if (!is_out)
+					continue;
+				simd->cull(&batch, &in->cull, b->cluster[k].first_block + j, 1);
+				assert_int_equal(batch.is_left[0], 0);
+			}
+		}
+	}
+	free(n);
+	bins_clear(&bins);
+	plan_clear(&plan);
+	return n_out > 0;
+}
+
+static void chunks_have_each_chosen_cube_once_and_leave_out_none_in_view(void **state)
+{
+	const struct tree_options sphere = { .levels = 8, .radius = 0.9, .keep = 1 };
+	const struct tree_options ball = { .levels = 7, .radius = 1.8, .is_solid = 1, .keep = 1 }; /* fills the cube */
+
+	(void)state;
+	assert_true(check_each_view(&sphere, 20, check_chunks) > 10);
+	assert_true(check_each_view(&ball, 20, check_chunks) > 4);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -200,6 +279,7 @@ int main(void)
 		cmocka_unit_test(so_they_do_of_what_has_two_sides),
 		cmocka_unit_test(so_they_do_of_sparse_clouds),
 		cmocka_unit_test(runs_make_a_twentieth_of_the_entries),
+		cmocka_unit_test(chunks_have_each_chosen_cube_once_and_leave_out_none_in_view),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
