@@ -507,9 +507,12 @@ hard-large: $(LARGE) $(LARGE_OCTREE) ## hard-large: a model of 100 million sampl
 bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock beside stamps of a relay and psrd's reports, of the same runs
 	$(Q)BUILD=$(BUILD) tests/bench/load.sh
 
-bench-octree: $(OCTREE_BENCH) ## bench-octree: octrees from 20 M points of LAS: time, memory, bits, rates; splats beside points, of the bunny
+bench-octree: $(OCTREE_BENCH) ## bench-octree: octrees from 20 M points of LAS: time, memory, bits, rates; a sparse cloud; splats and blocks beside points, of the bunny
 	$(Q)$(BUILD)/tests/bench/octree
-	$(Q)if [ -f $(fetched)/bunny.obj ]; then $(BUILD)/tests/bench/octree_draws -l 10 -s 512 $(fetched)/bunny.obj; \
+	$(Q)$(BUILD)/tests/bench/octree -n 2 -w $(BUILD)/tests/bench/terrain.las >/dev/null
+	$(Q)$(BUILD)/tests/bench/octree_draws -p -l 12 -s 512 $(BUILD)/tests/bench/terrain.las
+	$(Q)if [ -f $(fetched)/bunny.obj ]; then $(BUILD)/tests/bench/octree_draws -l 10 -s 512 $(fetched)/bunny.obj && \
+	$(BUILD)/tests/bench/octree_draws -p -b -l 9 -s 512 $(fetched)/bunny.obj; \
 	else echo "bunny.obj is not here: make models fetches it"; fi
 
 bench-pool: $(POOL_BENCH) ## bench-pool: what loops and hand-overs between flows cost; a small frame beside large ones; shares

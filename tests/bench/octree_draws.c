@@ -1,10 +1,14 @@
 /* What drawing an octree costs:
- * octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] [-p] MESH|CLOUD.las [BLOCKS.psr]
+ * octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] [-p] [-b] MESH|CLOUD.las [BLOCKS.psr]
  *
  * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. Frames
  * of points, of EWA splats (-p leaves them out), and with blocks of the same object those of blocks take turns, and
  * their times are medians; then those of stages. Points a second are those of cull and warp together, splats likewise;
- * the latter have a target, of two threads at 512x512 and leaves of about a pixel. */
+ * the latter have a target, of two threads at 512x512 and leaves of about a pixel.
+ *
+ * The same picture takes samples as dense. Octrees have leaves of a power of two, blocks any resolution: -b builds blocks
+ * of the mesh ("even") whose samples are as far apart as those of the leaves, so that frames take a level of either at the
+ * same distance (model/cubes.h, CUBES_LEVEL_SPACING). All spacings are printed. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,9 +20,11 @@
 #include "model/blocks.h"
 #include "model/cubes.h"
 #include "model/tree.h"
+#include "psr/build.h"
 #include "psr/mesh.h"
 #include "psr/render.h"
 #include "sample/octree/of_mesh.h"
+#include "surface/validate.h"
 
 #define N_THREADS 2
 #define MOST_FRAMES 400
@@ -34,7 +40,7 @@ struct subject {
 	enum psr_representation representation;
 	int with_splats;
 };
-#define MOST_SUBJECTS 3
+#define MOST_SUBJECTS 4
 
 struct times {
 	double frame[MOST_FRAMES], points[MOST_FRAMES], stage[PSR_N_STAGES][MOST_FRAMES], samples, covered;
@@ -54,8 +60,25 @@ static int read_cloud(struct octree **tree, const char *path, const struct octre
 	return rc;
 }
 
-static int read_mesh(struct octree **tree, const char *path, const struct octree_build_options *options,
-                     struct psr_error *err)
+/* Blocks whose samples are as dense as the tree's leaves on a plane along an axis, where these are fewest. */
+static int build_even(struct psr_model **out, const struct psr_mesh *mesh, const struct octree *tree,
+                      struct psr_error *err)
+{
+	const double spacing = CUBES_LEVEL_SPACING * ldexp(tree->edge, -tree->levels);
+	struct psr_build_options options;
+	double origin[3], scale;
+	int rc = validate_bound_mesh(mesh, origin, &scale, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	psr_build_options_default(&options);
+	options.resolution = (uint32_t)(2 * scale / spacing + 0.5);
+	return psr_model_build(out, mesh, &options, NULL, err);
+}
+
+/* even: NULL, or blocks as dense. */
+static int read_mesh(struct octree **tree, struct psr_model **even, const char *path,
+                     const struct octree_build_options *options, struct psr_error *err)
 {
 	struct octree_mesh_report report;
 	struct psr_mesh *mesh;
@@ -67,6 +90,8 @@ static int read_mesh(struct octree **tree, const char *path, const struct octree
 	if (rc == PSR_OK)
 		printf("%.2f %% of the leaves hold two sides, and the surface is %s\n",
 		       100.0 * (double)report.n_both / (double)(*tree)->n_leaves, report.is_closed ? "closed" : "open");
+	if (rc == PSR_OK && even != NULL)
+		rc = build_even(even, mesh, *tree, err);
 	psr_mesh_destroy(mesh);
 	return rc;
 }
@@ -198,50 +223,95 @@ static int measure(const struct bench *bench, const struct subject *subject, int
 struct wish {
 	struct octree_build_options options;
 	uint32_t side;
-	int n_rounds, n_threads, without_splats;
+	int n_rounds, n_threads, without_splats, with_even;
 };
+
+static void put_subject(struct subject *subject, int *n, const char *name, struct psr_model *model, int with_splats)
+{
+	const int is_octree = psr_model_cubes(model) != NULL;
+
+	subject[(*n)++] = (struct subject){ name, psr_model_ref(model), is_octree ? PSR_OCTREE : PSR_BLOCKS, with_splats };
+}
+
+static void print_spacings(const struct octree *tree, double scale, const struct subject *subject, int n)
+{
+	const double edge = ldexp(tree->edge, -tree->levels) * scale;
+
+	printf("leaves of %.5f, as dense as samples %.5f apart", edge, CUBES_LEVEL_SPACING * edge);
+	for (int s = 0; s < n; s++)
+		if (subject[s].representation == PSR_BLOCKS)
+			printf("; %s: %.5f apart", subject[s].name, psr_model_info(subject[s].model)->spacing);
+	printf("\n");
+}
+
+/* Of the tree, which it destroys, and of blocks, which may be NULL. */
+static int make_subjects(struct subject *subject, int *n, struct octree *tree, struct psr_model *blocks,
+                         struct psr_model *even, const struct wish *wish, struct psr_error *err)
+{
+	struct psr_model *model = NULL;
+	int rc = make_model(&model, tree, blocks != NULL ? blocks : even, err);
+
+	if (rc == PSR_OK)
+		rc = psr_model_make_cubes(model, err);
+	if (rc == PSR_OK) {
+		const struct psr_cubes *cubes = psr_model_cubes(model);
+
+		printf("%.2f M leaves, %.1f a cube; %.2f bits a leaf of codes, %.2f more of cubes and coarser levels\n",
+		       (double)tree->n_leaves * 1e-6, (double)tree->n_leaves / cubes->level[0].n,
+		       8.0 * (double)tree->n_codes / (double)tree->n_leaves, 8.0 * (double)cubes->n_bytes / (double)tree->n_leaves);
+		put_subject(subject, n, "points", model, 0);
+		if (!wish->without_splats)
+			put_subject(subject, n, "splats", model, 1);
+		if (blocks != NULL)
+			put_subject(subject, n, "blocks", blocks, 0);
+		if (even != NULL)
+			put_subject(subject, n, "even", even, 0);
+		print_spacings(tree, psr_model_info(model)->scale, subject, *n);
+	}
+	octree_destroy(tree);
+	psr_model_unref(model);
+	return rc;
+}
+
+static int read_subjects(struct subject *subject, int *n, const char *path, const char *blocks_path,
+                         const struct wish *wish, struct psr_error *err)
+{
+	struct psr_model *blocks = NULL, *even = NULL;
+	struct octree *tree = NULL;
+	int rc = blocks_path != NULL ? psr_model_read(&blocks, blocks_path, err) : PSR_OK;
+
+	if (rc == PSR_OK && strstr(path, ".las") != NULL)
+		rc = read_cloud(&tree, path, &wish->options, err);
+	else if (rc == PSR_OK)
+		rc = read_mesh(&tree, wish->with_even ? &even : NULL, path, &wish->options, err);
+	if (rc == PSR_OK)
+		rc = make_subjects(subject, n, tree, blocks, even, wish, err);
+	psr_model_unref(blocks);
+	psr_model_unref(even);
+	return rc;
+}
 
 static int run(const char *path, const char *blocks, const struct wish *wish, struct psr_error *err)
 {
 	const uint32_t side = wish->side;
-	struct subject subject[MOST_SUBJECTS] = { { "points", NULL, PSR_OCTREE, 0 }, { "splats", NULL, PSR_OCTREE, 1 },
-		                                      { "blocks", NULL, PSR_BLOCKS, 0 } };
+	struct subject subject[MOST_SUBJECTS] = { 0 };
 	struct bench bench = { .frame = { .width = side, .height = side }, .side = side };
-	int n_subjects = blocks != NULL ? 3 : 2;
-	struct octree *tree = NULL;
-	int rc = blocks != NULL ? psr_model_read(&subject[2].model, blocks, err) : PSR_OK;
+	int n_subjects = 0, rc = read_subjects(subject, &n_subjects, path, blocks, wish, err);
 
-	if (rc == PSR_OK)
-		rc = (strstr(path, ".las") != NULL ? read_cloud : read_mesh)(&tree, path, &wish->options, err);
-	if (rc == PSR_OK)
-		rc = make_model(&subject[0].model, tree, subject[2].model, err);
-	if (rc == PSR_OK)
-		rc = psr_model_make_cubes(subject[0].model, err);
-	if (rc != PSR_OK)
-		return rc;
-	subject[1].model = psr_model_ref(subject[0].model);
-	const struct psr_cubes *cubes = psr_model_cubes(subject[0].model);
-	printf("%.2f M leaves, %.1f a cube; %.2f bits a leaf of codes, %.2f more of cubes and coarser levels\n",
-	       (double)tree->n_leaves * 1e-6, (double)tree->n_leaves / cubes->level[0].n,
-	       8.0 * (double)tree->n_codes / (double)tree->n_leaves, 8.0 * (double)cubes->n_bytes / (double)tree->n_leaves);
-	octree_destroy(tree);
 	bench.frame.rgb = malloc((size_t)3 * side * side);
 	bench.frame.depth = malloc((size_t)side * side * sizeof *bench.frame.depth);
-	rc = psr_renderer_create(&bench.renderer, err);
+	if (rc == PSR_OK)
+		rc = psr_renderer_create(&bench.renderer, err);
 	if (rc == PSR_OK)
 		rc = psr_pool_create(&bench.pool, wish->n_threads, err);
-	if (wish->without_splats) {
-		psr_model_unref(subject[1].model);
-		subject[1] = subject[2];
-		subject[2].model = NULL;
-		n_subjects--;
-	}
 	if (rc == PSR_OK)
 		rc = measure(&bench, subject, n_subjects, wish->n_rounds, err);
 	psr_pool_destroy(bench.pool);
 	psr_renderer_destroy(bench.renderer);
-	for (int s = 0; s < MOST_SUBJECTS; s++)
+	for (int s = 0; s < n_subjects; s++)
 		psr_model_unref(subject[s].model);
+	free(bench.frame.rgb);
+	free(bench.frame.depth);
 	return rc;
 }
 
@@ -252,7 +322,7 @@ int main(int argc, char **argv)
 	int option, rc;
 
 	octree_build_options_default(&wish.options);
-	while ((option = getopt(argc, argv, "l:s:n:t:p")) != -1) {
+	while ((option = getopt(argc, argv, "l:s:n:t:pb")) != -1) {
 		if (option == '?')
 			return 2;
 		wish.options.levels = option == 'l' ? atoi(optarg) : wish.options.levels;
@@ -260,9 +330,10 @@ int main(int argc, char **argv)
 		wish.n_rounds = option == 'n' ? atoi(optarg) : wish.n_rounds;
 		wish.n_threads = option == 't' ? atoi(optarg) : wish.n_threads;
 		wish.without_splats |= option == 'p';
+		wish.with_even |= option == 'b';
 	}
 	if (optind >= argc || wish.side == 0 || wish.n_rounds * DIRECTIONS > MOST_FRAMES) {
-		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] [-p] MESH|CLOUD.las "
+		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] [-p] [-b] MESH|CLOUD.las "
 		                "[BLOCKS.psr]\n");
 		return 2;
 	}
