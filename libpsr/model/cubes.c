@@ -124,6 +124,7 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 	struct psr_cube_run *run;
 	char *memory;
 
+	n += cubes_n_bunches(m->tree) * sizeof *m->bunch;
 	for (int l = 0; l < m->n_levels; l++)
 		n += cubes_n_runs(&cubes->level[l]) * (sizeof *run + sizeof *bound);
 	memory = psr_alloc_array(n, 1);
@@ -142,7 +143,8 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 		bound += cubes_n_runs(&cubes->level[l]);
 	}
 	m->cluster = (struct psr_cluster *)bound;
-	m->flags = (uint8_t *)(m->cluster + n_clusters);
+	cubes->bunch = m->bunch = (struct psr_cube_bunch *)(m->cluster + n_clusters);
+	m->flags = (uint8_t *)(m->bunch + cubes_n_bunches(m->tree));
 	if (has_cones) {
 		for (int a = 0; a < 3; a++)
 			m->axis[a] = (int8_t *)m->flags + (size_t)(a + 1) * n_cubes;
@@ -242,6 +244,7 @@ uint64_t psr_cubes_guess(const struct octree *tree, unsigned leaf)
 		if (h >= 2)
 			bytes += nodes * bytes_cube + n_skips * sizeof(struct psr_cluster);
 	}
+	bytes += (double)cubes_n_bunches(tree) * sizeof(struct psr_cube_bunch);
 	return (uint64_t)bytes;
 }
 

@@ -32,9 +32,13 @@ struct psr_cube_bound {
 	float center[3], radius;
 	int8_t axis[3];
 	uint8_t sine; /* PSR_CONE_ANY without cones */
-	uint8_t width; /* the level in its cubes' flags; PSR_CUBE_WIDTHS where these have several */
 };
-#define PSR_CUBE_WIDTHS 255
+
+#define CUBES_BUNCH 64 /* groups of clusters that follow each other */
+/* Holds the spheres of a bunch's clusters of all levels, inner units. */
+struct psr_cube_bunch {
+	float center[3], radius;
+};
 
 struct psr_cube_level {
 	const struct octree *tree; /* of level 0 the model's; each further one has a level less, and averaged attributes */
@@ -60,6 +64,7 @@ struct psr_cubes {
 	struct psr_blocks groups;
 	struct psr_cube_level level[CUBES_MOST_LEVELS];
 	const struct psr_cube *cube;
+	const struct psr_cube_bunch *bunch; /* one for CUBES_BUNCH groups */
 	struct psr_scan scan;
 	uint64_t n_bytes;
 };

@@ -1,4 +1,5 @@
-/* Bounds of runs of cubes, so that a frame leaves 64 of them out at once. */
+/* Bounds of runs of cubes, so that a frame leaves 64 of them out at once, and of bunches of clusters, so that it chooses the
+ * level of 64 at once. */
 #include <math.h>
 #include "cubes_make.h"
 
@@ -70,20 +71,42 @@ static void bound_cone(struct psr_cube_bound *bound, const struct psr_blocks *b,
 	bound->sine = (uint8_t)sine;
 }
 
-static uint8_t width_of(const struct psr_blocks *b, uint32_t first, uint32_t end)
+static void bound_bunch(const struct cubes_making *m, uint64_t bunch)
 {
-	const uint32_t width = psr_blocks_level(b, first);
+	const uint64_t n_groups = m->tree->n_skips, first = bunch * CUBES_BUNCH;
+	const uint64_t end = n_groups - first < CUBES_BUNCH ? n_groups : first + CUBES_BUNCH;
+	struct psr_cube_bunch *to = &m->bunch[bunch];
+	double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY }, radius = 0;
 
-	for (uint32_t i = first + 1; i < end; i++)
-		if (psr_blocks_level(b, i) != width)
-			return PSR_CUBE_WIDTHS;
-	return (uint8_t)width;
+	for (uint64_t i = first; i < end; i++)
+		for (int a = 0; a < 3; a++) {
+			low[a] = fmin(low[a], (double)m->cluster[i].center[a]);
+			high[a] = fmax(high[a], (double)m->cluster[i].center[a]);
+		}
+	for (int a = 0; a < 3; a++)
+		to->center[a] = (float)((low[a] + high[a]) / 2);
+	for (int l = 0; l < m->n_levels; l++)
+		for (uint64_t i = first; i < end; i++) {
+			const struct psr_cluster *k = &m->cluster[(uint64_t)l * n_groups + i];
+			double square = 0;
+
+			for (int a = 0; a < 3; a++) {
+				const double off = (double)k->center[a] - (double)to->center[a];
+
+				square += off * off;
+			}
+			radius = fmax(radius, sqrt(square) + (double)k->radius);
+		}
+	to->radius = (float)(radius * (1 + 1e-6));
 }
 
 void cubes_bound_task(int task, void *userdata)
 {
 	const struct cubes_making *m = userdata;
+	const uint64_t bunches = cubes_n_bunches(m->tree), end_bunch = bunches * ((uint64_t)task + 1) / OCTREE_TASKS;
 
+	for (uint64_t i = bunches * (uint64_t)task / OCTREE_TASKS; i < end_bunch; i++)
+		bound_bunch(m, i);
 	for (int l = 0; l < m->n_levels; l++) {
 		const struct psr_cube_level *level = &m->cubes->level[l];
 		const uint64_t runs = cubes_n_runs(level), last = runs * ((uint64_t)task + 1) / OCTREE_TASKS;
@@ -94,7 +117,7 @@ void cubes_bound_task(int task, void *userdata)
 
 			struct psr_cube_bound *bound = &m->bound[l][r];
 
-			*bound = (struct psr_cube_bound){ .sine = PSR_CONE_ANY, .width = width_of(&m->cubes->groups, first, end) };
+			*bound = (struct psr_cube_bound){ .sine = PSR_CONE_ANY };
 			bound_sphere(bound, m->cubes, level, first, end);
 			if (m->sine != NULL)
 				bound_cone(bound, &m->cubes->groups, first, end);

@@ -19,6 +19,7 @@ struct cubes_making {
 	/* Arrays to fill; levels follow each other in all but `run`. */
 	struct psr_cluster *cluster;
 	struct psr_cube *cube;
+	struct psr_cube_bunch *bunch;
 	struct psr_cube_run *run[CUBES_MOST_LEVELS];
 	struct psr_cube_bound *bound[CUBES_MOST_LEVELS];
 	uint8_t *flags, *sine;     /* sine, axis: NULL without cones */
@@ -29,11 +30,16 @@ struct cubes_making {
 void cubes_count_task(int task, void *userdata);
 /* Fills the trees and arrays of a task; in cubes, `code` and `leaf` are the low bits of their places in the level. */
 void cubes_fill_task(int task, void *userdata);
-/* Bounds the runs of a task. After all tasks have filled. */
+/* Bounds the runs and bunches of a task. After all tasks have filled. */
 void cubes_bound_task(int task, void *userdata);
 
 /* Finds which streams of a scan a tree has, and their ranges. MEMORY. */
 int cubes_survey_scan(struct psr_scan *scan, const struct octree *tree, struct psr_error *err);
+
+static inline uint64_t cubes_n_bunches(const struct octree *tree)
+{
+	return (tree->n_skips + CUBES_BUNCH - 1) / CUBES_BUNCH;
+}
 
 static inline uint32_t cubes_n_runs(const struct psr_cube_level *level)
 {

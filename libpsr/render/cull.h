@@ -13,7 +13,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 #define CULL_MOST_CHUNK 2048 /* blocks, or chosen cubes, of a chunk */
 
 /* Blocks first_block .. first_block + n_blocks - 1, of cubes of one level the chosen ones among these; first_cluster holds
- * the first. n_drawn: blocks or cubes, where n_hits are entries of runs. */
+ * the first, or comes before the cluster that does. n_drawn: blocks or cubes, where n_hits are entries of runs. */
 struct cull_chunk {
 	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits, n_drawn;
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
@@ -47,6 +47,7 @@ struct cull_group {
 	uint8_t level; /* of the cluster that is drawn */
 	uint8_t fits;
 	uint8_t is_out; /* of cubes: nothing of it is in view */
+	uint8_t n_alike; /* of cubes: so many groups from this one on are alike; 1 if that is not known */
 };
 
 static inline int cull_is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
@@ -94,6 +95,8 @@ struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struc
 /* Returns 0 if nothing within the sphere can draw: it is outside of the picture, grown by the guard band of the
  * coarsest depth buffer. */
 int cull_sees_sphere(const struct plan *plan, const struct cull_sphere *sphere);
+/* Returns whether all of the sphere is in the picture. */
+int cull_holds_sphere(const struct plan *plan, const struct cull_sphere *sphere);
 /* Finds what pixels a sphere may cover, as coordinates: bound[0] of x, least and greatest. It must reach beyond
  * near_z. */
 void cull_bound_sphere(float bound[2][2], const struct plan *plan, const struct cull_sphere *sphere);

@@ -10,12 +10,27 @@ static uint32_t n_groups_of(const struct psr_blocks *b)
 	return b->n_clusters / b->n_levels;
 }
 
-/* A group's cluster that is drawn; NULL out of view. */
-static const struct psr_cluster *chosen_of(const struct bins *bins, const struct plan_instance *in, uint32_t group)
-{
-	const struct cull_group *g = &bins->group[in->first_group + group];
+/* Cubes of groups that follow each other. */
+struct span {
+	uint32_t first, n; /* n: 0 out of view */
+	uint32_t cluster, n_groups;
+	unsigned level;
+};
 
-	return g->is_out ? NULL : &in->cull.blocks->cluster[g->level * n_groups_of(in->cull.blocks) + group];
+/* Of a group, and of those that are known to be alike. */
+static struct span span_of(const struct bins *bins, const struct plan_instance *in, uint32_t group)
+{
+	const struct psr_blocks *b = in->cull.blocks;
+	const struct cull_group *g = &bins->group[in->first_group + group];
+	const uint32_t cluster = g->level * n_groups_of(b) + group;
+	struct span span = { .cluster = cluster, .n_groups = g->n_alike, .level = g->level };
+
+	if (g->is_out)
+		return span;
+	const struct psr_cluster *last = &b->cluster[cluster + g->n_alike - 1];
+	span.first = b->cluster[cluster].first_block;
+	span.n = last->first_block + last->n_blocks - span.first;
+	return span;
 }
 
 static uint64_t count_blocks(const struct bins *bins, const struct plan *plan)
@@ -24,14 +39,15 @@ static uint64_t count_blocks(const struct bins *bins, const struct plan *plan)
 
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct plan_instance *in = &plan->instance[i];
-		const struct psr_blocks *b = in->cull.blocks;
+		struct span span;
 
-		if (in->cull.cubes == NULL)
-			n += b->n_blocks;
-		for (uint32_t g = 0; in->cull.cubes != NULL && g < n_groups_of(b) && !plan_is_cancelled_at(plan, g); g++) {
-			const struct psr_cluster *k = chosen_of(bins, in, g);
-
-			n += k != NULL ? k->n_blocks : 0;
+		if (in->cull.cubes == NULL) {
+			n += in->cull.blocks->n_blocks;
+			continue;
+		}
+		for (uint32_t g = 0; g < n_groups_of(in->cull.blocks) && !plan_is_cancelled(plan); g += span.n_groups) {
+			span = span_of(bins, in, g);
+			n += span.n;
 		}
 	}
 	return n;
@@ -59,18 +75,16 @@ static uint32_t put_cubes(struct cull_chunk *chunk, const struct bins *bins, con
 	const struct plan_instance *in = &plan->instance[instance];
 	struct cull_chunk open[CUBES_MOST_LEVELS];
 	uint32_t n_open[CUBES_MOST_LEVELS] = { 0 }, n = 0;
+	struct span span;
 
-	for (uint32_t g = 0; g < n_groups_of(in->cull.blocks) && !plan_is_cancelled_at(plan, g); g++) {
-		const struct psr_cluster *k = chosen_of(bins, in, g);
-		uint32_t first = k != NULL ? k->first_block : 0, left = k != NULL ? k->n_blocks : 0, took;
+	for (uint32_t g = 0, took; g < n_groups_of(in->cull.blocks) && !plan_is_cancelled(plan); g += span.n_groups) {
+		span = span_of(bins, in, g);
+		struct cull_chunk *to = &open[span.level];
+		uint32_t *n_own = &n_open[span.level];
 
-		for (; left > 0; left -= took, first += took) {
-			struct cull_chunk *to = &open[k->level];
-			uint32_t *n_own = &n_open[k->level];
-
+		for (uint32_t first = span.first, left = span.n; left > 0; left -= took, first += took) {
 			if (*n_own == 0)
-				*to = (struct cull_chunk){ .instance = instance, .first_block = first,
-					                       .first_cluster = (uint32_t)(k - in->cull.blocks->cluster) };
+				*to = (struct cull_chunk){ .instance = instance, .first_block = first, .first_cluster = span.cluster };
 			took = left < most - *n_own ? left : most - *n_own;
 			to->n_blocks = first + took - to->first_block;
 			*n_own += took;

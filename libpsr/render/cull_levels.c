@@ -2,8 +2,8 @@
 #include <string.h>
 #include "cull.h"
 
-#define GROUPS_TASK 256 /* groups of cubes for a thread at a time, some ten microseconds */
-#define ROUNDING 1e-3f  /* more than what floats are off by, of what is compared with cubes' */
+#define FEW_BUNCHES 4  /* of groups of cubes, which take some microseconds: for one thread */
+#define ROUNDING 1e-3f /* more than what floats are off by, of what is compared with cubes' */
 
 static inline float to_camera(const float m[4], float x, float y, float z)
 {
@@ -102,8 +102,8 @@ static void choose_of_blocks(struct cull_group *group, const struct plan *plan, 
 
 /* ---- cubes: each level has a cluster of each group, in the order of groups ---- */
 
-/* Returns a level above which none fits: where a unit of length spans least pixels, at a group's farthest, samples are more
- * than a pixel apart already. What is before the eye only in part tells nothing. */
+/* Returns a level above which none fits: where a unit of length spans least pixels, at the sphere's farthest, samples are
+ * more than a pixel apart already. What is before the eye only in part tells nothing. */
 static unsigned coarsest_of(const struct plan *plan, const struct plan_instance *in, const struct cull_sphere *v,
                             unsigned level)
 {
@@ -117,31 +117,66 @@ static unsigned coarsest_of(const struct plan *plan, const struct plan_instance 
 	return level;
 }
 
+/* Out of view any level will do. */
+static struct cull_group choose_group(const struct plan *plan, const struct plan_instance *in, uint32_t group)
+{
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t n_groups = b->n_clusters / b->n_levels;
+	const struct psr_cluster *own = &b->cluster[group];
+	unsigned level = b->n_levels - 1;
+	const struct cull_sphere v = cull_view_cluster(in, &own[level * n_groups]);
+
+	if (!cull_sees_sphere(plan, &v))
+		return (struct cull_group){ .is_out = 1, .n_alike = 1 };
+	level = coarsest_of(plan, in, &v, level);
+	while (level > 0 && !fits_cluster(plan, in, &own[level * n_groups]))
+		level--;
+	return (struct cull_group){ .level = (uint8_t)level, .fits = level > 0, .n_alike = 1 };
+}
+
+/* Chooses of a bunch of groups at once, if all are out of view; or if all may be in view, no level above one fits the
+ * farthest of them, and that one fits the nearest. */
+static int choose_alike(struct cull_group *out, const struct plan *plan, const struct plan_instance *in, uint32_t bunch)
+{
+	const struct psr_cube_bunch *bound = &in->cull.cubes->bunch[bunch];
+	const struct cull_sphere v = cull_view_sphere(in, bound->center, bound->radius);
+
+	*out = (struct cull_group){ .is_out = 1 };
+	if (!cull_sees_sphere(plan, &v))
+		return 1;
+	if (plan->perspective && !(v.c[2] - v.r > plan->near_z))
+		return 0;
+	const unsigned level = coarsest_of(plan, in, &v, in->cull.blocks->n_levels - 1);
+	const float stretch = cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2] - v.r);
+	const float pixels = stretch * in->level_spacing * (float)(1u << level) * plan->finer * (1 + ROUNDING);
+	*out = (struct cull_group){ .level = (uint8_t)level, .fits = level > 0 };
+	return (level == 0 || pixels <= 1) && cull_holds_sphere(plan, &v);
+}
+
 struct choosing {
 	struct cull_group *group;
 	const struct plan *plan;
 	const struct plan_instance *in;
 };
 
-/* Out of view any level will do. */
-static void choose_of_cubes(int task, void *userdata)
+static void choose_of_bunch(int bunch, void *userdata)
 {
 	const struct choosing *c = userdata;
 	const struct psr_blocks *b = c->in->cull.blocks;
-	const uint32_t n_groups = b->n_clusters / b->n_levels, first = (uint32_t)task * GROUPS_TASK;
-	const uint32_t end = n_groups - first < GROUPS_TASK ? n_groups : first + GROUPS_TASK;
+	const uint32_t n_groups = b->n_clusters / b->n_levels, first = (uint32_t)bunch * CUBES_BUNCH;
+	const uint32_t n = n_groups - first < CUBES_BUNCH ? n_groups - first : CUBES_BUNCH;
+	struct cull_group alike;
 
-	for (uint32_t i = first; i < end; i++) {
-		const struct psr_cluster *own = &b->cluster[i];
-		unsigned level = b->n_levels - 1;
-		const struct cull_sphere v = cull_view_cluster(c->in, &own[level * n_groups]);
-		const int is_out = !cull_sees_sphere(c->plan, &v);
-
-		level = is_out ? 0 : coarsest_of(c->plan, c->in, &v, level);
-		while (level > 0 && !fits_cluster(c->plan, c->in, &own[level * n_groups]))
-			level--;
-		c->group[i] = (struct cull_group){ .level = (uint8_t)level, .fits = level > 0, .is_out = (uint8_t)is_out };
+	if (choose_alike(&alike, c->plan, c->in, (uint32_t)bunch)) {
+		alike.n_alike = 1;
+		for (uint32_t i = 1; i < n; i++)
+			c->group[first + i] = alike;
+		alike.n_alike = (uint8_t)n;
+		c->group[first] = alike;
+		return;
 	}
+	for (uint32_t i = first; i < first + n; i++)
+		c->group[i] = choose_group(c->plan, c->in, i);
 }
 
 int cull_choose_levels(struct bins *bins, const struct plan *plan, struct psr_pool *pool)
@@ -155,8 +190,8 @@ int cull_choose_levels(struct bins *bins, const struct plan *plan, struct psr_po
 			choose_of_blocks(c.group, plan, in);
 			continue;
 		}
-		const uint32_t n_tasks = (b->n_clusters / b->n_levels + GROUPS_TASK - 1) / GROUPS_TASK;
-		psr_pool_for_until(n_tasks > 1 ? pool : NULL, &plan->cancel, (int)n_tasks, choose_of_cubes, &c);
+		const uint32_t n_bunches = (b->n_clusters / b->n_levels + CUBES_BUNCH - 1) / CUBES_BUNCH;
+		psr_pool_for_until(n_bunches > FEW_BUNCHES ? pool : NULL, &plan->cancel, (int)n_bunches, choose_of_bunch, &c);
 	}
 	return plan_is_cancelled(plan) ? PSR_ERR_CANCELLED : PSR_OK;
 }

@@ -38,6 +38,17 @@ int cull_sees_sphere(const struct plan *plan, const struct cull_sphere *sphere)
 	       && bound[1][0] - guard < (float)plan->height;
 }
 
+int cull_holds_sphere(const struct plan *plan, const struct cull_sphere *sphere)
+{
+	float bound[2][2];
+
+	if (!(sphere->c[2] - sphere->r * 1.0001f > plan->near_z))
+		return 0;
+	cull_bound_sphere(bound, plan, sphere);
+	return bound[0][0] >= 0 && bound[1][0] >= 0 && bound[0][1] <= (float)plan->width
+	       && bound[1][1] <= (float)plan->height;
+}
+
 /* As the kernel decides of a block, of all samples of a run. */
 enum cull_facing cull_run_faces(const struct plan_instance *in, const struct psr_cube_bound *bound, uint8_t flags)
 {

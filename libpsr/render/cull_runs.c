@@ -1,9 +1,16 @@
-/* Cubes by runs of 64: those of a run that are drawn alike, in the same tiles, are one hit. Most runs are of one level,
- * in one tile and before the eye: then the run's bound tells all but how its cubes face. */
+/* Cubes by runs of 64: those of a run that are drawn alike, in the same tiles, are one hit. Most runs are in one tile and
+ * before the eye, and what their cubes' flags say decides the depth buffer: then the run's bound tells all but how its
+ * cubes face. */
 #include "base/vec.h"
 #include "cull.h"
 
 #define ROUNDING 1e-4f /* more than what floats are off by, of lengths that are compared with cubes' */
+
+/* The cubes of a run that are drawn, by the level in their flags, which is how wide leaves are drawn. */
+struct chosen {
+	uint32_t first, n; /* the run */
+	uint64_t cubes[PSR_BLOCK_LEVEL + 1];
+};
 
 /* What the hits of a run have in common. */
 struct alike {
@@ -121,114 +128,129 @@ static void find_stretch(float stretch[2], const struct cull_view *v, const stru
 	stretch[1] = v->focal * (1 - ROUNDING) * (!v->perspective ? 1 : (side > far ? side : far) / (far * far));
 }
 
-/* Finds an axis' first and last pixel of the sphere. Returns whether it is within the picture, and all that its samples
- * can reach within one tile. */
-static int find_side(int32_t side[2], const float bound[2], float band, float size, int32_t tile_size, int32_t *tile)
+/* Finds the tile of an axis that holds all which the sphere's samples can reach. Returns whether it is one, and the sphere
+ * within the picture. */
+static int find_tile(int32_t *tile, const float bound[2], float size, int32_t tile_size)
 {
-	const float most = size - 1, low = bound[0] - band, high = bound[1] + band;
+	const float most = size - 1;
 	const float first = bound[0] - 2 > 0 ? bound[0] - 2 : 0, last = bound[1] + 2 < most ? bound[1] + 2 : most;
 
 	if (!(bound[0] >= 0 && bound[1] <= most))
 		return 0;
-	side[0] = (int32_t)(low > 0 ? low : 0);
-	side[1] = (int32_t)(high < most ? high : most);
 	*tile = (int32_t)first / tile_size;
 	return (int32_t)last / tile_size == *tile;
 }
 
-/* Returns whether all cubes of a run are in the picture, within one tile, and need the depth buffer of one level. */
-static int find_all_alike(struct alike *out, float stretch[2], const struct plan *plan, const struct plan_instance *in,
-                          const struct psr_cube_bound *run, const struct cull_sphere *sphere)
+/* Finds an axis' first and last pixel of the sphere. */
+static void find_side(int32_t side[2], const float bound[2], float band, float size)
+{
+	const float most = size - 1, low = bound[0] - band, high = bound[1] + band;
+
+	side[0] = (int32_t)(low > 0 ? low : 0);
+	side[1] = (int32_t)(high < most ? high : most);
+}
+
+/* What the bound tells of a run. */
+struct told {
+	struct alike alike[PSR_BLOCK_LEVEL + 1]; /* of what is as wide */
+	float stretch[2];
+	int widest;
+};
+
+/* Returns whether all cubes of a run are in the picture, within one tile, and those that are as wide need the depth buffer
+ * of one level. */
+static int find_alike_by_bound(struct told *out, const struct plan *plan, const struct plan_instance *in,
+                               const struct chosen *run, const struct cull_sphere *sphere)
 {
 	const struct cull_view *v = &in->cull;
-	const float spacing = v->spacing * (float)(1u << run->width);
 	float bound[2][2];
 	int32_t tile_x, tile_y;
 
-	if (run->width == PSR_CUBE_WIDTHS || !(sphere->c[2] - sphere->r > plan->near_z))
-		return 0;
-	find_stretch(stretch, v, sphere);
-	out->level = cull_level(stretch[0] * spacing * CULL_LESS);
-	if (out->level != cull_level(stretch[1] * spacing * CULL_LESS) || out->level > PSR_MAX_DEPTH_LEVEL)
+	if (!(sphere->c[2] - sphere->r > plan->near_z))
 		return 0;
 	cull_bound_sphere(bound, plan, sphere);
-	const float band = (float)(1u << out->level) + 2;
-	const int is_within = find_side(out->x, bound[0], band, v->width, TILE_WIDTH, &tile_x)
-	                      && find_side(out->y, bound[1], band, v->height, TILE_HEIGHT, &tile_y);
-	if (!is_within)
+	if (!find_tile(&tile_x, bound[0], v->width, TILE_WIDTH) || !find_tile(&tile_y, bound[1], v->height, TILE_HEIGHT))
 		return 0;
-	out->near = (sphere->c[2] - sphere->r) * (1 - ROUNDING);
-	out->tiles = tile_x | tile_x << 8 | tile_y << 16 | tile_y << 24;
+	find_stretch(out->stretch, v, sphere);
+	for (int w = 0; w <= PSR_BLOCK_LEVEL; w++) {
+		const float spacing = v->spacing * (float)(1u << w);
+		struct alike *alike = &out->alike[w];
+
+		if (!run->cubes[w])
+			continue;
+		alike->level = cull_level(out->stretch[0] * spacing * CULL_LESS);
+		if (alike->level != cull_level(out->stretch[1] * spacing * CULL_LESS) || alike->level > PSR_MAX_DEPTH_LEVEL)
+			return 0;
+		const float band = (float)(1u << alike->level) + 2;
+		find_side(alike->x, bound[0], band, v->width);
+		find_side(alike->y, bound[1], band, v->height);
+		alike->near = (sphere->c[2] - sphere->r) * (1 - ROUNDING);
+		alike->tiles = tile_x | tile_x << 8 | tile_y << 16 | tile_y << 24;
+		out->widest = w;
+	}
 	return 1;
 }
 
-static void take_run(struct cull_counting *to, uint32_t first, uint32_t n, uint64_t chosen)
+static void take_run(struct cull_counting *to, const struct psr_cube_level *level, const struct chosen *run)
 {
 	const struct plan *plan = to->plan;
 	const struct plan_instance *in = &plan->instance[to->chunk->instance];
-	const struct psr_cube_level *level = psr_cubes_level(in->cull.cubes, first);
-	const struct psr_cube_bound *bound = &level->bound[(first - level->first) / CUBES_RUN];
-	const struct cull_sphere sphere = cull_view_sphere(in, bound->center, bound->radius);
 	struct cull_batch batch;
-	struct alike alike;
-	float stretch[2];
+	struct told told;
+	uint64_t chosen = 0;
 
+	for (int w = 0; w <= PSR_BLOCK_LEVEL; w++)
+		chosen |= run->cubes[w];
+	if (!chosen || plan_is_cancelled(plan))
+		return;
+	const struct psr_cube_bound *bound = &level->bound[(run->first - level->first) / CUBES_RUN];
+	const struct cull_sphere sphere = cull_view_sphere(in, bound->center, bound->radius);
 	if (!cull_sees_sphere(plan, &sphere))
 		return;
-	const enum cull_facing facing = cull_run_faces(in, bound, in->cull.blocks->flags[first]);
+	const enum cull_facing facing = cull_run_faces(in, bound, in->cull.blocks->flags[run->first]);
 	if (facing == CULL_AWAY)
 		return;
 	to->chunk->n_tested += cull_count_bits(chosen);
-	if (!find_all_alike(&alike, stretch, plan, in, bound, &sphere)) {
-		to->simd->cull(&batch, &in->cull, first, n);
-		take_batch(to, &batch, first, chosen);
+	if (!find_alike_by_bound(&told, plan, in, run, &sphere)) {
+		to->simd->cull(&batch, &in->cull, run->first, run->n);
+		take_batch(to, &batch, run->first, chosen);
 		return;
 	}
 	batch.sum.left = chosen;
 	batch.sum.mixed = facing == CULL_FACES_EYE ? 0 : chosen;
 	if (facing == CULL_MIXED && in->cull.with_cones && in->cull.blocks->cone_sine != NULL)
-		to->simd->cull_cones(&batch, &in->cull, first, n);
+		to->simd->cull_cones(&batch, &in->cull, run->first, run->n);
 	const uint64_t left = batch.sum.left & chosen, mixed = batch.sum.mixed & chosen;
-	put_hit(to, &alike, first, mixed, 1);
-	put_hit(to, &alike, first, left & ~mixed, 0);
+	for (int w = 0; w <= told.widest; w++) {
+		put_hit(to, &told.alike[w], run->first, run->cubes[w] & mixed, 1);
+		put_hit(to, &told.alike[w], run->first, run->cubes[w] & left & ~mixed, 0);
+	}
 	if (left)
-		note_run(to, first, left, mixed, stretch[0] * in->cull.spacing * (float)(1u << bound->width),
-		         stretch[0] * in->cull.scale * (float)(level->edge * (CUBES_DIAGONAL / 2)));
+		note_run(to, run->first, left, mixed, told.stretch[0] * in->cull.spacing * (float)(1u << told.widest),
+		         told.stretch[0] * in->cull.scale * (float)(level->edge * (CUBES_DIAGONAL / 2)));
 }
 
-/* The cubes of a run that are drawn. */
-struct chosen {
-	uint32_t first; /* the run's; UINT32_MAX: none yet */
-	uint64_t cubes;
-};
-
-static void take_chosen(struct cull_counting *to, const struct psr_cube_level *level, const struct chosen *run)
-{
-	const uint32_t left = run->cubes ? level->first + level->n - run->first : 0;
-
-	if (left > 0 && !plan_is_cancelled(to->plan))
-		take_run(to, run->first, left < CUBES_RUN ? left : CUBES_RUN, run->cubes);
-}
-
-/* A chunk is of one level, whose clusters are in the order of groups. */
+/* A chunk is of one level, whose clusters are in the order of groups. The cubes of a cluster are as wide. */
 void cull_count_runs(struct cull_counting *to)
 {
 	const struct cull_chunk *chunk = to->chunk;
 	const struct plan_instance *in = &to->plan->instance[chunk->instance];
+	const struct psr_blocks *b = in->cull.blocks;
 	const struct psr_cube_level *level = psr_cubes_level(in->cull.cubes, chunk->first_block);
-	const struct psr_cluster *cluster = in->cull.blocks->cluster;
 	const struct cull_group *group = to->bins->group + in->first_group;
-	const uint32_t end = chunk->first_block + chunk->n_blocks, l = (uint32_t)(level - in->cull.cubes->level);
-	const uint32_t n_groups = in->cull.blocks->n_clusters / in->cull.blocks->n_levels, of_level = l * n_groups;
-	struct chosen run = { UINT32_MAX, 0 };
+	const uint32_t end = chunk->first_block + chunk->n_blocks, level_end = level->first + level->n;
+	const uint32_t l = (uint32_t)(level - in->cull.cubes->level), n_groups = b->n_clusters / b->n_levels;
+	struct chosen run = { .first = UINT32_MAX }; /* none yet */
 
-	for (uint32_t g = chunk->first_cluster - of_level, next; g < n_groups; g++) {
-		const struct psr_cluster *k = &cluster[of_level + g];
+	for (uint32_t g = chunk->first_cluster - l * n_groups, next, step; g < n_groups; g += step) {
+		const struct psr_cluster *k = &b->cluster[l * n_groups + g];
 
-		if (group[g].level != l || group[g].is_out)
-			continue;
 		if (k->first_block >= end)
 			break;
+		step = group[g].n_alike;
+		if (group[g].level != l || group[g].is_out)
+			continue;
+		step = 1;
 		uint32_t first = k->first_block > chunk->first_block ? k->first_block : chunk->first_block;
 		const uint32_t own_end = k->first_block + k->n_blocks < end ? k->first_block + k->n_blocks : end;
 		for (; first < own_end; first = next) {
@@ -236,11 +258,11 @@ void cull_count_runs(struct cull_counting *to)
 
 			next = own_end - begin < CUBES_RUN ? own_end : begin + CUBES_RUN;
 			if (begin != run.first) {
-				take_chosen(to, level, &run);
-				run = (struct chosen){ begin, 0 };
+				take_run(to, level, &run);
+				run = (struct chosen){ .first = begin, .n = level_end - begin < CUBES_RUN ? level_end - begin : CUBES_RUN };
 			}
-			run.cubes |= UINT64_MAX >> (CUBES_RUN - (next - first)) << in_run;
+			run.cubes[psr_blocks_level(b, first)] |= UINT64_MAX >> (CUBES_RUN - (next - first)) << in_run;
 		}
 	}
-	take_chosen(to, level, &run);
+	take_run(to, level, &run);
 }

@@ -262,6 +262,57 @@ static int check_chunks(const struct psr_scene *scene, const struct render_setti
 	return n_out > 0;
 }
 
+/* Levels with bounds of bunches, and with ones that tell nothing. Returns whether a bunch was chosen at once. */
+static int check_bunches(const struct psr_scene *scene, const struct render_settings *settings)
+{
+	struct plan plan = { 0 };
+	struct bins bins[2] = { 0 };
+	int has_alike = 0;
+
+	assert_int_equal(psr_scene_validate(scene, NULL), PSR_OK);
+	assert_int_equal(plan_make(&plan, scene, settings, NULL), PSR_OK);
+	const struct psr_cubes *cubes = plan.instance[0].cull.cubes;
+	const uint32_t n_groups = cubes->groups.n_clusters / cubes->groups.n_levels;
+	const uint32_t n_bunches = (n_groups + CUBES_BUNCH - 1) / CUBES_BUNCH;
+	struct psr_cube_bunch *const wide = calloc(n_bunches, sizeof *wide);
+	struct psr_cubes other = *cubes;
+	assert_non_null(wide);
+	for (uint32_t i = 0; i < n_bunches; i++)
+		wide[i].radius = 1e20f;
+	other.bunch = wide;
+	for (int k = 0; k < 2; k++) {
+		assert_true(bins_room(&bins[k], group, plan.n_groups));
+		assert_int_equal(cull_choose_levels(&bins[k], &plan, NULL), PSR_OK);
+		for (uint32_t i = 0; i < plan.n_instances; i++)
+			plan.instance[i].cull.cubes = &other;
+	}
+	for (uint32_t i = 0; i < plan.n_instances; i++)
+		for (uint32_t g = 0; g < n_groups; g++) {
+			const struct cull_group *a = &bins[0].group[plan.instance[i].first_group + g];
+			const struct cull_group *b = &bins[1].group[plan.instance[i].first_group + g];
+
+			assert_int_equal(a->level, b->level);
+			assert_int_equal(a->fits, b->fits);
+			assert_int_equal(a->is_out, b->is_out);
+			assert_int_equal(b->n_alike, 1);
+			has_alike |= a->n_alike > 1;
+		}
+	for (int k = 0; k < 2; k++)
+		bins_clear(&bins[k]);
+	plan_clear(&plan);
+	free(wide);
+	return has_alike;
+}
+
+static void bunches_have_the_levels_of_their_groups(void **state)
+{
+	/* A thousand groups: of three views one at least has a bunch that is all in the picture, or all out of it. */
+	const struct tree_options cloud = { .levels = 10, .radius = 0.9, .keep = 0.2 };
+
+	(void)state;
+	assert_true(check_each_view(&cloud, 60, check_bunches) > 20);
+}
+
 static void chunks_have_each_chosen_cube_once_and_leave_out_none_in_view(void **state)
 {
 	const struct tree_options sphere = { .levels = 8, .radius = 0.9, .keep = 1 };
@@ -279,6 +330,7 @@ int main(void)
 		cmocka_unit_test(so_they_do_of_what_has_two_sides),
 		cmocka_unit_test(so_they_do_of_sparse_clouds),
 		cmocka_unit_test(runs_make_a_twentieth_of_the_entries),
+		cmocka_unit_test(bunches_have_the_levels_of_their_groups),
 		cmocka_unit_test(chunks_have_each_chosen_cube_once_and_leave_out_none_in_view),
 	};
 
