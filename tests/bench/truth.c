@@ -144,7 +144,7 @@ int main(int argc, char **argv)
 		{ "only", 0, PSR_OPT_STRING, &bench.only, "NAMES", "These models, with commas between them.", 0, 0, NULL, NULL,
 		  NULL },
 		{ "rows", 0, PSR_OPT_STRING, &bench.rows, "NAMES",
-		  "These rows: defaults, raw, double, smooth, shadows, lamps, close, still.", 0, 0, NULL, NULL, NULL },
+		  "These rows: defaults, raw, double, smooth, shadows, lamps, close, texture, still.", 0, 0, NULL, NULL, NULL },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

@@ -28,6 +28,7 @@ const struct truth_row truth_rows[] = {
 	{ "lamps", "the same, lit by two lamps near it", 256, 256, 1, 3, 4, 1, 1, { NULL }, NULL },
 	{ "close", "magnification 4 of a model of 1024, 256x256, with shadows", 1024, 256, 4, 2, 4, 1, 0, { NULL },
 	  "teapot dragon gavel chair" },
+	{ "texture", "magnification 1, 256x256, in pass 1", 256, 256, 1, VIEWS, 4, 0, 0, { "--passes=1", NULL }, "table" },
 	{ "still", "pass 4, 256x256, models of 1024", 1024, 256, 0.25, 1, 16, 0, 0, { "--passes=4", NULL }, NULL },
 };
 const unsigned truth_n_rows = sizeof truth_rows / sizeof truth_rows[0];

@@ -6,6 +6,7 @@
 #include "candidates.h"
 #include "dice.h"
 #include "psr/error.h"
+#include "sample/visible/buried.h"
 #include "sample/visible/sides.h"
 
 #define STEP 0.33      /* pixels between places */
@@ -96,7 +97,8 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], i
 			rc = place_cells_add(&chunk->thin_cells, p, NO_WAY);
 		else if (is_side_seen && is_small)
 			rc = place_cells_add(&chunk->rest_cells, p, place.n);
-		if (rc == PSR_OK && is_side_seen && !is_covered(job, &place))
+		if (rc == PSR_OK && is_side_seen && !is_covered(job, &place)
+		    && (is_thin || !is_buried(sampling->scene, job->keeper->visible->ds, place.p, place.n)))
 			rc = places_add(is_thin ? &chunk->thin : &chunk->rest, &place);
 		chunk->failed |= rc != PSR_OK;
 	}

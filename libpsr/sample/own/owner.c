@@ -53,7 +53,8 @@ static int is_seen(const struct job *job, int i, uint32_t patch, unsigned s, int
 	locate(job, i, patch, s, p, n);
 	if (turned)
 		v3f_scale(n, n, -1);
-	return visible_set_has(job->finds->visible, p, n);
+	return turned ? visible_set_has(job->finds->visible, p, n)
+	              : visible_set_shows(job->finds->visible, job->sampling->scene, p, n);
 }
 
 /* Gives each place at first to the projection that faces the face's own normal best: the field is made of these places,

@@ -1,6 +1,7 @@
 #include <math.h>
 #include "base/cell.h"
 #include "base/direction.h"
+#include "buried.h"
 #include "psr/error.h"
 #include "visible_set.h"
 
@@ -134,7 +135,7 @@ static void look_along_rows(int i, void *userdata)
 
 int visible_set_init(struct visible_set *set, double ds)
 {
-	*set = (struct visible_set){ .width = CELL_PIXELS * ds };
+	*set = (struct visible_set){ .width = CELL_PIXELS * ds, .ds = ds };
 	return table_init(&set->table, sizeof(uint64_t), 1 << 16);
 }
 
@@ -193,7 +194,7 @@ int visible_set_look(struct visible_set *set, const struct ray_scene *scene, uin
 
 int visible_set_coarsen(struct visible_set *set, const struct visible_set *finer)
 {
-	*set = (struct visible_set){ .width = 2 * finer->width };
+	*set = (struct visible_set){ .width = 2 * finer->width, .ds = finer->ds };
 	if (table_init(&set->table, sizeof(uint64_t), finer->table.size) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	for (size_t i = 0; i < finer->table.size; i++)
@@ -233,6 +234,11 @@ int visible_set_has(const struct visible_set *set, const float p[3], const float
 		}
 	}
 	return 0;
+}
+
+int visible_set_shows(const struct visible_set *set, const struct ray_scene *scene, const float p[3], const float n[3])
+{
+	return visible_set_has(set, p, n) && !is_buried(scene, set->ds, p, n);
 }
 
 int visible_set_add(struct visible_set *set, const float p[3], const float n[3])

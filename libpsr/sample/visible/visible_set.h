@@ -10,6 +10,7 @@ struct visible_set {
 	double width;       /* of a cell, inner units */
 	unsigned n_views;   /* looked along so far */
 	struct table table; /* keys alone: a cell and a facing */
+	double ds;          /* a pixel of the finest level */
 };
 
 int visible_set_init(struct visible_set *set, double ds); /* MEMORY; visible_set_fini() either way */
@@ -22,11 +23,14 @@ void visible_set_fini(struct visible_set *set);
 #define VISIBLE_MOST_VIEWS 512
 int visible_set_look(struct visible_set *set, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);
 
-/* Makes a set with cells twice as wide. MEMORY; call visible_set_fini() even then. */
+/* Makes a set with cells twice as wide, of the same ds. MEMORY; call visible_set_fini() even then. */
 int visible_set_coarsen(struct visible_set *set, const struct visible_set *finer);
 
 /* Returns whether views saw anything near p that faces like n (unit, on the side that the view met). */
 int visible_set_has(const struct visible_set *set, const float p[3], const float n[3]);
+
+/* Returns whether that may be the surface at p, and not one beneath which p is buried (buried.h). */
+int visible_set_shows(const struct visible_set *set, const struct ray_scene *scene, const float p[3], const float n[3]);
 
 /* Adds a place that the views missed. MEMORY. */
 int visible_set_add(struct visible_set *set, const float p[3], const float n[3]);

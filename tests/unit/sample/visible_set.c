@@ -258,6 +258,64 @@ static void what_is_seen_is_seen_of_coarser_cells(void **state)
 	look_away(&looked);
 }
 
+/* A floor, and a lid of half its side above the middle. */
+static struct psr_mesh *make_floor(double above)
+{
+	struct psr_mesh *mesh = meshes_new(8, 4);
+
+	for (uint32_t i = 0; i < 8; i++) {
+		const double half = i < 4 ? 0.6 : 0.3;
+
+		mesh->position[i][0] = (i & 1 ? 1 : -1) * half;
+		mesh->position[i][1] = (i & 2 ? 1 : -1) * half;
+		mesh->position[i][2] = i < 4 ? 0 : above;
+	}
+	for (uint32_t t = 0; t < 4; t++) {
+		const uint32_t first = 4 * (t / 2);
+
+		mesh->triangle[t][0] = first + t % 2;
+		mesh->triangle[t][1] = first + 1 + 2 * (t % 2);
+		mesh->triangle[t][2] = first + 2;
+	}
+	return mesh;
+}
+
+/* Rays less than 72 degrees off the normal reach h tan 72, 1.24 pixels for 0.4, under the lid's edge. */
+static void what_lies_close_beneath_is_not_seen(void **state)
+{
+	static const double above[] = { 0.4, 1.1 }; /* pixels: within the pixel that covers, and beyond */
+	const float up[3] = { 0, 0, 1 };
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		struct looked looked;
+		struct visible_set coarse;
+		int n_beneath = 0;
+
+		look_at(&looked, make_floor(above[i] * DS), DS, 2);
+		/* No ray of a view passes within two pixels of the middle. */
+		for (double x = 4 * DS; x < 0.55; x += DS / 3)
+			for (double y = 4 * DS; y < 0.55; y += DS / 3) {
+				const float p[3] = { (float)x, (float)y, 0 }, lid[3] = { (float)x, (float)y, (float)(above[i] * DS) };
+				const double outside = fmax(x, y) - 0.3;
+
+				const int is_near = visible_set_has(&looked.visible, p, up);
+				const int is_seen = visible_set_shows(&looked.visible, looked.scene, p, up);
+				assert_int_equal(visible_set_coarsen(&coarse, &looked.visible), PSR_OK);
+				if (outside > 0 || i == 1)
+					assert_int_equal(is_seen, is_near);
+				else if (outside < -1.24 * DS)
+					assert_false(is_seen | visible_set_shows(&coarse, looked.scene, p, up));
+				n_beneath += is_near && outside < -1.24 * DS;
+				if (outside < 0)
+					assert_true(visible_set_shows(&looked.visible, looked.scene, lid, up));
+				visible_set_fini(&coarse);
+			}
+		assert_true(n_beneath > 100); /* they would count as seen by the lid's cells alone */
+		look_away(&looked);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -269,6 +327,7 @@ int main(void)
 		cmocka_unit_test(what_is_added_is_seen),
 		cmocka_unit_test(looking_ends_soon_where_nothing_hides),
 		cmocka_unit_test(what_is_seen_is_seen_of_coarser_cells),
+		cmocka_unit_test(what_lies_close_beneath_is_not_seen),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
