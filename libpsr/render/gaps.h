@@ -14,7 +14,7 @@ struct gaps_map {
  * - coverage), where cells cover a pixel that is further than them by more than their level's threshold; empty pixels
  * are at infinity. A pinhole has weight 0: a pixel behind, by more than level 1's threshold, at least seven of its
  * eight neighbours, which are one surface (within level 1's threshold of each other, or level 4's where the pixel is
- * empty). Sets bricks[i] to whether brick i has a weight below WEIGHT_ONE. */
+ * empty); so has a pixel of a crack (cracks.h). Sets bricks[i] to whether brick i has a weight below WEIGHT_ONE. */
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack,
                              uint32_t y0, uint32_t y1, const struct gaps_map *map);
 

@@ -22,12 +22,16 @@ struct gaps_target {
 	const float *scale, *offset; /* by level */
 	uint16_t *weight;            /* stack->width * stack->height */
 	enum psr_gap_method method;
+	/* Room for all pixels of a piece, or NULL: takes y * GAPS_WIDTH + x, from the piece's first pixel, of those in slits,
+	 * which have a weight and lie behind at least six of their eight neighbours by more than level 1's threshold. */
+	uint16_t *slit;
 };
 
 struct gaps_counts {
 	uint32_t n_partial;  /* pixels with a sample and a weight below GAPS_WHOLE */
 	uint32_t n_pinholes; /* pixels, with a sample or without, that the guard closed and no cell covers whole */
 	uint32_t n_marked;   /* bricks with a weight below GAPS_WHOLE */
+	uint32_t n_slits;    /* pixels listed */
 };
 
 /* Computes weights of the pixels x0 <= x < x1, y0 <= y < y1: the share, of GAPS_WHOLE, that no nearer cell covers; 0

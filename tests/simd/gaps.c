@@ -51,12 +51,15 @@ static void piece(struct check *c, uint32_t width, uint32_t height, uint32_t lev
 	const uint32_t x1 = x0 + GAPS_WIDTH < width ? x0 + GAPS_WIDTH : width;
 	const uint32_t y1 = y0 + GAPS_BRICK < height ? y0 + GAPS_BRICK : height;
 	const enum psr_gap_method method = numbers == SMOOTH ? PSR_GAPS_CLOSED : (enum psr_gap_method)check_below(c, 3);
-	const struct gaps_target target = { stack, scale, offset, check_out(c, area, sizeof(uint16_t)), method };
+	uint16_t *weight = check_out(c, area, sizeof *weight), *slit = check_out(c, GAPS_WIDTH * GAPS_BRICK, sizeof *slit);
+	const int with_slits = numbers == SMOOTH ? levels == 0 : check_one_in(c, 2);
+	const struct gaps_target target = { stack, scale, offset, weight, method, with_slits ? slit : NULL };
 	uint8_t *marks = check_out(c, GAPS_WIDTH / GAPS_BRICK, 1);
 	check_units(c, (uint64_t)(x1 - x0) * (y1 - y0));
 	while (check_next(c)) {
 		const struct gaps_counts counts = c->simd->gaps(&target, x0, x1, y0, y1, marks);
-		check_result(c, (uint64_t)counts.n_marked << 40 | (uint64_t)counts.n_pinholes << 20 | counts.n_partial);
+		check_result(c, (uint64_t)counts.n_slits << 50 | (uint64_t)counts.n_marked << 40
+		                    | (uint64_t)counts.n_pinholes << 20 | counts.n_partial);
 	}
 }
 
@@ -96,7 +99,7 @@ int main(int argc, char **argv)
 		{ "gaps: noise", noise, 600, NULL },
 		{ "gaps: a surface with holes and pinholes", surface, 600, NULL },
 		{ "gaps: infinite, huge, denormal and no numbers", spoilt_numbers, 600, NULL },
-		{ "gaps, the guard alone", bench_guard, 0, "pixel" },
+		{ "gaps, the guard and slits alone", bench_guard, 0, "pixel" },
 		{ "gaps, depth levels 1 and 2", bench_levels, 0, "pixel" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);

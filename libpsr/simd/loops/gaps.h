@@ -1,6 +1,7 @@
 /* Finding gaps: how much of each pixel nearer surfaces cover ([G] 4.6), and the guard against pinholes. */
 #include "gaps_cells.h"
 #include "gaps_close.h"
+#include "gaps_slits.h"
 
 /* Samples of level 0 miss a pixel only by rounding, and then a single one. The guard closes pixels behind at least
  * seven of their eight neighbours, if those are one surface: within level ALIKE's threshold of each other, since a
@@ -80,7 +81,7 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 	struct gaps_tile tile = { .x0 = x0, .y0 = y0, .width = x1 - x0, .height = y1 - y0 };
 	struct gaps_level level[PSR_MAX_DEPTH_LEVEL + 1];
 	float limit[GAPS_BRICK][GAPS_WIDTH];
-	struct gaps_counts counts = { 0, 0, 0 };
+	struct gaps_counts counts = { 0, 0, 0, 0 };
 
 	_Alignas(64) int32_t is_marked[GAPS_WIDTH] = { 0 }, n_partial[GAPS_WIDTH] = { 0 };
 	load_depths(&tile, t->stack, t->stack->levels ? GAPS_MARGIN : 1);
@@ -105,6 +106,8 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 				                                        : cover_level(weight, &level[k], t, &tile, y);
 		const uint32_t n_pinholes = guard_row(weight, t, &tile, y);
 		counts.n_pinholes += n_pinholes;
+		if (t->slit != NULL)
+			counts.n_slits += list_slits(t->slit + counts.n_slits, weight, t, &tile, y);
 		for (uint32_t x = 0; x < tile.width; x++)
 			to[x] = (uint16_t)weight[x];
 		if (!is_less && !n_pinholes)

@@ -1,0 +1,67 @@
+#include "cracks.h"
+
+#include <math.h>
+#include "base/maths.h"
+
+struct crack {
+	uint32_t at[CRACK_MOST][2];
+	int n;
+	uint64_t nearest; /* of the words around; UINT64_MAX: none */
+	float farthest;   /* of their depths */
+};
+
+static float depth_of(uint64_t word)
+{
+	return psr_float_from_bits((uint32_t)(word >> 32));
+}
+
+/* Adds the pixel, unless it is known. Returns 0 if there is no room. */
+static int add(struct crack *c, uint32_t x, uint32_t y)
+{
+	for (int k = 0; k < c->n; k++)
+		if (c->at[k][0] == x && c->at[k][1] == y)
+			return 1;
+	if (c->n == CRACK_MOST)
+		return 0;
+	c->at[c->n][0] = x;
+	c->at[c->n++][1] = y;
+	return 1;
+}
+
+/* Looks at what is around a pixel of the crack. Returns 0 if the crack reaches the border, or is too long. */
+static int look_around(struct crack *c, const struct plan *plan, const struct psr_zstack *stack, float own, int k)
+{
+	const uint32_t x = c->at[k][0], y = c->at[k][1];
+
+	if (x == 0 || y == 0 || x + 1 == stack->width || y + 1 == stack->height)
+		return 0;
+	for (uint32_t v = y - 1; v <= y + 1; v++)
+		for (uint32_t u = x - 1; u <= x + 1; u++) {
+			const uint64_t word = psr_zstack_row(stack, v)[u];
+			const float z = depth_of(word);
+
+			if (z * plan->gap_scale[1] + plan->gap_offset[1] < own) {
+				c->nearest = word < c->nearest ? word : c->nearest;
+				c->farthest = z > c->farthest ? z : c->farthest;
+			} else if (!add(c, u, v)) {
+				return 0;
+			}
+		}
+	return 1;
+}
+
+int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
+{
+	const float own = depth_of(psr_zstack_row(stack, y)[x]);
+	struct crack c = { .at = { { x, y } }, .n = 1, .nearest = UINT64_MAX };
+	uint32_t instance;
+
+	for (int k = 0; k < c.n; k++)
+		if (!look_around(&c, plan, stack, own, k))
+			return 0;
+	if (c.nearest == UINT64_MAX)
+		return 0;
+	instance = plan_find_instance(plan, (uint32_t)c.nearest / PSR_BLOCK_SAMPLES);
+	return plan->warp[instance].points != NULL && c.farthest - depth_of(c.nearest) <=
+	       (c.n > CRACK_SHORT ? CRACK_APART / 2 : CRACK_APART) * plan->instance[instance].level_spacing;
+}
