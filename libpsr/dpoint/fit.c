@@ -159,7 +159,7 @@ static void look_at(struct bars *bars, const struct fitting *f, const struct rec
 	if (bar.at[0] + f->overhang >= r->extent[0] || bar.at[1] + f->overhang >= r->extent[1] ||
 	    v3f_dot(cell->normal, r->axis[2]) < -0.5f || rectangle_suits(&f->look, r, cell, middle) ||
 	    fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1])) > 2 * radius + 4 * r->height ||
-	    is_crossing(f, r, middle, radius))
+	    is_behind(bars, bar.at[0] + f->overhang, bar.at[1] + f->overhang) || is_crossing(f, r, middle, radius))
 		return;
 	for (int k = 0; k < 2; k++)
 		bar.at[k] += f->overhang;
