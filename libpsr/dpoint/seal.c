@@ -59,30 +59,35 @@ static void lid_make(struct lid *lid, struct dpoint_cell *cell, const struct dpo
 /* ---- a cell ---- */
 
 /* Lids around a cell. */
+struct near_lid {
+	const struct lid *lid;
+	float place[3]; /* that is looked at, in the lid's frame */
+};
+
 struct nearby {
-	uint32_t *lid;
+	struct near_lid *near;
 	size_t n, room;
 	int is_failed;
 };
 
-static void gather(struct nearby *nearby, const struct cell_tree *tree, size_t i, const float middle[3], float radius)
+static void gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius)
 {
-	const struct cell_node *node = &tree->node[i];
+	const struct cell_node *node = &s->tree.node[i];
 	float away[3];
 
 	v3f_sub(away, node->middle, middle);
 	if (v3f_dot(away, away) > (node->radius + radius) * (node->radius + radius))
 		return;
 	if (!cell_node_is_leaf(node)) {
-		gather(nearby, tree, 2 * i + 1, middle, radius);
-		gather(nearby, tree, 2 * i + 2, middle, radius);
+		gather(nearby, s, 2 * i + 1, middle, radius);
+		gather(nearby, s, 2 * i + 2, middle, radius);
 		return;
 	}
-	if (!ARRAY_ROOM(nearby->lid, nearby->n, nearby->room)) {
+	if (!ARRAY_ROOM(nearby->near, nearby->n, nearby->room)) {
 		nearby->is_failed = 1;
 		return;
 	}
-	nearby->lid[nearby->n++] = tree->order[node->begin];
+	nearby->near[nearby->n++].lid = &s->lid[s->tree.order[node->begin]];
 }
 
 /* Whether the rectangle stops each ray to the place p, in its frame, whose cosine to `normal` is at least
@@ -134,6 +139,19 @@ static int stops(const struct lid *lid, const float p[3], const float from[3], f
 	return meets(&lid->rectangle, p, w, 1, behind) || (lid->is_two_sided && meets(&lid->rectangle, p, w, -1, behind));
 }
 
+/* Stops those of the open rays that the lid is in the way of. Returns how many are left. */
+static int stop_rays(uint8_t *is_stopped, int n_open, const struct lid *lid, const float p[3], const float (*from)[3],
+                     float behind)
+{
+	for (int d = 0; d < DIRECTIONS; d++)
+		if (!is_stopped[d] && stops(lid, p, from[d], behind)) {
+			is_stopped[d] = 1;
+			n_open--;
+		}
+	return n_open;
+}
+
+/* Lids over the place come first: they stop most rays. */
 static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, const float at[3],
                         const float (*from)[3], const float normal[3])
 {
@@ -141,24 +159,20 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 	uint8_t is_stopped[DIRECTIONS] = { 0 };
 
 	for (size_t i = 0; i < nearby->n; i++) {
-		const struct rectangle *r = &s->lid[nearby->lid[i]].rectangle;
-		float p[3];
+		struct near_lid *near = &nearby->near[i];
 
-		rectangle_sees(p, r, at);
-		if (stops_all(r, p, normal, s->behind))
+		rectangle_sees(near->place, &near->lid->rectangle, at);
+		if (stops_all(&near->lid->rectangle, near->place, normal, s->behind))
 			return 1;
 	}
-	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
-		const struct lid *lid = &s->lid[nearby->lid[i]];
-		float p[3];
+	for (int is_over = 1; is_over >= 0; is_over--)
+		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+			const struct near_lid *near = &nearby->near[i];
+			const float *p = near->place, *extent = near->lid->rectangle.extent;
 
-		rectangle_sees(p, &lid->rectangle, at);
-		for (int d = 0; d < DIRECTIONS; d++)
-			if (!is_stopped[d] && stops(lid, p, from[d], s->behind)) {
-				is_stopped[d] = 1;
-				n_open--;
-			}
-	}
+			if ((fabsf(p[0]) <= extent[0] && fabsf(p[1]) <= extent[1]) == is_over)
+				n_open = stop_rays(is_stopped, n_open, near->lid, p, from, s->behind);
+		}
 	return n_open == 0;
 }
 
@@ -199,7 +213,7 @@ static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at
 		radius = fmaxf(radius, v3f_length(away));
 	}
 	nearby->n = 0;
-	gather(nearby, &s->tree, 0, middle, radius + 2 * s->behind);
+	gather(nearby, s, 0, middle, radius + 2 * s->behind);
 	for (int side = 0; side < 1 + is_two_sided(s->options, cell->part); side++) {
 		for (int p = 0; p < PLACES; p++) {
 			const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
@@ -228,7 +242,7 @@ static void look(int chunk, void *userdata)
 			s->is_open[i] = (uint8_t)!is_sealed(s, &nearby, (uint32_t)i);
 	if (nearby.is_failed)
 		__atomic_store_n(&s->is_failed, 1, __ATOMIC_RELAXED);
-	free(nearby.lid);
+	free(nearby.near);
 }
 
 /* ---- all cells ---- */
