@@ -200,6 +200,24 @@ static int directions(float (*from)[3], const struct sealing *s, const struct dp
 	return 1;
 }
 
+/* Brings lids over the place to the front: there they are asked first. */
+static void put_first(struct nearby *nearby, const float at[3])
+{
+	size_t n = 0;
+
+	for (size_t i = 0; i < nearby->n; i++) {
+		const struct near_lid near = nearby->near[i];
+		const struct rectangle *r = &near.lid->rectangle;
+		float p[3];
+
+		rectangle_sees(p, r, at);
+		if (fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]) {
+			nearby->near[i] = nearby->near[n];
+			nearby->near[n++] = near;
+		}
+	}
+}
+
 static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
 {
 	const struct dpoint_cell *cell = &s->surface->cell[at];
@@ -214,6 +232,7 @@ static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at
 	}
 	nearby->n = 0;
 	gather(nearby, s, 0, middle, radius + 2 * s->behind);
+	put_first(nearby, middle);
 	for (int side = 0; side < 1 + is_two_sided(s->options, cell->part); side++) {
 		for (int p = 0; p < PLACES; p++) {
 			const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
