@@ -107,6 +107,11 @@ static const struct study_kind tables[] = {
 	  "Pictures of 800x600 with one light, roughness 0.25. A size is how many pixels of the picture are one that the\n"
 	  "models are for. kB: in memory. dB: to the ray-traced source, inside the object; bright: of its bright pixels.\n"
 	  "Holes are pixels; leaks, and blocks' holes and leaks, are a million pixels'.", NULL },
+	{ "dpoint-holes", "[K] 4.2", "holes between differential points, at magnifications", table_dpoint_holes,
+	  "teapot,gavel,toybird,chair",
+	  "Each magnification has eight views around the model, from all heights. M pixels: whose neighbourhood meets the\n"
+	  "object. Holes are pixels of these that are empty, or show what is more than three samples behind all of the\n"
+	  "neighbourhood's surfaces; blocks: theirs, in the same views.", NULL },
 	{ "dpoint-models", "[K] table 1", "differential points: three models", table_dpoint_models, "teapot,gavel",
 	  NOTE_DPOINT_MODELS, NULL },
 	{ "dpoint-meshes", "[K] 4.1", "differential points of meshes", table_dpoint_meshes, "top,teapot,toybird,gavel",

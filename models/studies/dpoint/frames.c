@@ -2,7 +2,6 @@
 #include "model/points.h"
 #include "model/tree.h"
 #include "models/studies/tables/tables.h"
-#include "sample/dpoint/of_mesh.h"
 #include "study_dpoint.h"
 #include "view.h"
 
@@ -37,24 +36,6 @@ static double *value(const struct subject *s, int column)
 static double across(const struct subject *s, double times)
 {
 	return DPOINT_VIEW_HEIGHT * 2.0 / s->view.study->resolution / times;
-}
-
-static int make_points(struct subject *s, const struct study_model *model)
-{
-	struct study *study = s->view.study;
-	struct dpoint_build_options options;
-	struct dpoint_build_report report;
-	struct psr_model_info info = { .up = { 0, 1, 0 } };
-	struct dpoint_set set;
-	int rc;
-
-	dpoint_build_options_default(&options, study->resolution);
-	options.pool = study->pool;
-	rc = dpoint_of_mesh(&set, &info, &report, model->mesh, &options, study->err);
-	if (rc == PSR_OK)
-		rc = psr_model_create_of(&s->way[0].model, &info, &(struct psr_model_parts){ .points = &set }, NULL, study->err);
-	dpoint_set_fini(&set);
-	return rc;
 }
 
 static int put_times(struct subject *s)
@@ -94,7 +75,7 @@ static int run_model(struct subject *s, const struct study_model *model)
 	int rc = dpoint_view_open(&s->view, model, across(s, 1));
 
 	if (rc == PSR_OK)
-		rc = make_points(s, model);
+		rc = study_dpoint_of_mesh(&s->way[0].model, study, model);
 	if (rc == PSR_OK)
 		rc = study_build(&s->way[1].model, NULL, study, model);
 	for (int i = 0; i < N_SIZES && rc == PSR_OK; i++, s->row++) {

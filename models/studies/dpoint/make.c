@@ -7,6 +7,7 @@
 #include "dpoint/mesh.h"
 #include "model/points.h"
 #include "model/tree.h"
+#include "sample/dpoint/of_mesh.h"
 #include "study_dpoint.h"
 #include "surface/material.h"
 
@@ -161,6 +162,23 @@ int study_dpoint_model(struct psr_model **out, struct study *study, const struct
 		rc = psr_model_create_of(out, &info, &(struct psr_model_parts){ .points = &set }, NULL, study->err);
 	else
 		psr_fail(study->err, rc, "no memory for the points of %s", of->name);
+	dpoint_set_fini(&set);
+	return rc;
+}
+
+int study_dpoint_of_mesh(struct psr_model **out, const struct study *study, const struct study_model *of)
+{
+	struct dpoint_build_options options;
+	struct dpoint_build_report report;
+	struct psr_model_info info = { .up = { 0, 1, 0 } };
+	struct dpoint_set set;
+	int rc;
+
+	dpoint_build_options_default(&options, study->resolution);
+	options.pool = study->pool;
+	rc = dpoint_of_mesh(&set, &info, &report, of->mesh, &options, study->err);
+	if (rc == PSR_OK)
+		rc = psr_model_create_of(out, &info, &(struct psr_model_parts){ .points = &set }, NULL, study->err);
 	dpoint_set_fini(&set);
 	return rc;
 }

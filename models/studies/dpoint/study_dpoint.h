@@ -67,7 +67,11 @@ void study_dpoint_dull(struct psr_material *material);
 int study_dpoint_model(struct psr_model **out, struct study *study, const struct study_model *of,
                        struct dpoint_surface *surface, const struct dpoint_choice *choice, int is_specular);
 
+/* Makes a model of the mesh's differential points as psr-model build does. */
+int study_dpoint_of_mesh(struct psr_model **out, const struct study *study, const struct study_model *of);
+
 int table_dpoint(struct study *study);
+int table_dpoint_holes(struct study *study);
 int table_dpoint_meshes(struct study *study);
 int table_dpoint_error(struct study *study);
 int table_dpoint_frames(struct study *study);
