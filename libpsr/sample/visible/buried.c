@@ -3,9 +3,8 @@
 #include "buried.h"
 #include "places.h"
 
-/* The renderer takes what lies 0.75 spacings behind a surface for a part of it (decision 0149): as much along n at 41
- * degrees. */
-#define COVER 1.0
+/* What lies no further behind a surface the renderer takes for a part of it (decision 0149). */
+#define COVER 0.75
 #define SKIN 0.01 /* pixels: the surface itself is no cover */
 #define RAYS 64
 #define WIDEST 0.95 /* the sine of the rays' greatest angle */

@@ -283,7 +283,7 @@ static struct psr_mesh *make_floor(double above)
 /* Rays less than 72 degrees off the normal reach h tan 72, 1.24 pixels for 0.4, under the lid's edge. */
 static void what_lies_close_beneath_is_not_seen(void **state)
 {
-	static const double above[] = { 0.4, 1.1 }; /* pixels: within the pixel that covers, and beyond */
+	static const double above[] = { 0.4, 1.1 }; /* pixels: within the 0.75 that cover, and beyond */
 	const float up[3] = { 0, 0, 1 };
 
 	(void)state;
