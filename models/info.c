@@ -220,7 +220,7 @@ static void print_text(const struct summary *s)
 	if (s->tree != NULL)
 		info_print_octree(s->tree, &s->shares, s->info->scale);
 	if (s->points != NULL)
-		info_print_points(s->points, s->info);
+		info_print_points(s->points, s->info, s->file_bytes);
 	if (blocks == NULL)
 		return;
 	printf("samples           %" PRIu64 "\n", blocks->n_samples);
@@ -322,7 +322,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	if (s->tree != NULL)
 		cJSON_AddItemToObject(root, "octree", info_octree_json(s->tree, &s->shares, s->info->scale));
 	if (s->points != NULL)
-		cJSON_AddItemToObject(root, "dpoints", info_points_json(s->points, s->info));
+		cJSON_AddItemToObject(root, "dpoints", info_points_json(s->points, s->info, s->file_bytes));
 	return json_print(root, err);
 }
 

@@ -6,7 +6,8 @@
 
 static double bytes_of(const struct dpoint_set *set)
 {
-	return (double)sizeof *set->word + (double)sizeof *set->group * set->n_groups / set->n_points;
+	return (double)sizeof *set->word + (double)sizeof *set->group * set->n_groups / set->n_points +
+	       (set->delta != NULL ? sizeof *set->delta : 0);
 }
 
 static double epsilon_of(const struct dpoint_set *set)
@@ -19,22 +20,23 @@ static double pixels_of(const struct dpoint_set *set, const struct psr_model_inf
 	return (double)set->height * info->resolution / 2;
 }
 
-void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info)
+void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info, uint64_t file_bytes)
 {
-	printf("points            %" PRIu32 " differential points in %" PRIu32 " groups, %.1f bytes a point\n", set->n_points,
-	       set->n_groups, bytes_of(set));
+	printf("points            %" PRIu32 " differential points in %" PRIu32 " groups, %.1f bytes a point; %.1f in the file\n",
+	       set->n_points, set->n_groups, bytes_of(set), (double)file_bytes / set->n_points);
 	printf("  epsilon         %.4g\n", epsilon_of(set));
 	printf("  off by          %.3g at most, %.3g pixels of the resolution\n", (double)set->height * info->scale,
 	       pixels_of(set, info));
 }
 
-cJSON *info_points_json(const struct dpoint_set *set, const struct psr_model_info *info)
+cJSON *info_points_json(const struct dpoint_set *set, const struct psr_model_info *info, uint64_t file_bytes)
 {
 	cJSON *part = cJSON_CreateObject();
 
 	cJSON_AddNumberToObject(part, "points", set->n_points);
 	cJSON_AddNumberToObject(part, "groups", set->n_groups);
 	cJSON_AddNumberToObject(part, "bytes_per_point", bytes_of(set));
+	cJSON_AddNumberToObject(part, "bytes_per_point_in_file", (double)file_bytes / set->n_points);
 	cJSON_AddNumberToObject(part, "epsilon", epsilon_of(set));
 	cJSON_AddNumberToObject(part, "height", (double)set->height * info->scale);
 	cJSON_AddNumberToObject(part, "height_pixels", pixels_of(set, info));

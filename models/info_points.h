@@ -5,7 +5,7 @@
 #include <cjson/cJSON.h>
 #include "model/points.h"
 
-void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info);
-cJSON *info_points_json(const struct dpoint_set *set, const struct psr_model_info *info);
+void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info, uint64_t file_bytes);
+cJSON *info_points_json(const struct dpoint_set *set, const struct psr_model_info *info, uint64_t file_bytes);
 
 #endif

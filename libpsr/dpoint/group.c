@@ -59,12 +59,12 @@ static uint32_t cut(float low[3], float high[3], const struct key *key, size_t n
 	return count;
 }
 
-static uint32_t kind_of(const struct dpoint_candidate *c, const struct dpoint_grouping *grouping)
+static uint32_t kind_of(const struct dpoint_candidate *c, const uint8_t *two_sided, int has_own)
 {
-	const uint8_t *two_sided = grouping->is_two_sided;
+	const uint32_t du = has_own ? DPOINT_OWN_DELTA : dpoint_delta_class(c->delta[0]);
+	const uint32_t dv = has_own ? DPOINT_OWN_DELTA : dpoint_delta_class(c->delta[1]);
 
-	return (uint32_t)(two_sided != NULL && two_sided[c->part]) << 16 | dpoint_delta_class(c->delta[0]) << 8 |
-	       dpoint_delta_class(c->delta[1]);
+	return (uint32_t)(two_sided != NULL && two_sided[c->part]) << 16 | du << 8 | dv;
 }
 
 /* Groups before they are in their order: the first key of each. */
@@ -101,47 +101,96 @@ static size_t cut_all(struct cut_group *to, const struct key *key, size_t n, con
 	return n_groups;
 }
 
-int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *grouping)
-{
-	const struct dpoint_surface *surface = grouping->surface;
-	const size_t room = grouping->choice->n_kept + 1;
-	struct key *key = malloc(room * sizeof *key);
-	struct cut_group *cut_group = malloc(room * sizeof *cut_group);
-	struct dpoint_group *group = malloc(room * sizeof *group);
-	struct dpoint_word *word = malloc(room * sizeof *word);
-	size_t n = 0;
+/* The kept candidates and their groups. */
+struct making {
+	const struct dpoint_grouping *grouping;
+	struct key *key;
+	struct cut_group *cut_group;
+	size_t n, n_groups;
+};
 
-	*set = (struct dpoint_set){ .sine = grouping->sine, .group = group, .word = word };
-	if (key == NULL || cut_group == NULL || group == NULL || word == NULL || room > UINT32_MAX) {
-		free(key);
-		free(cut_group);
-		return room > UINT32_MAX ? PSR_ERR_LIMIT : PSR_ERR_MEMORY;
-	}
+static void group_all(struct making *m, int has_own)
+{
+	const struct dpoint_surface *surface = m->grouping->surface;
+
+	m->n = 0;
 	for (uint32_t i = 0; i < surface->n_candidates; i++) {
 		const struct dpoint_candidate *c = &surface->candidate[i];
 
-		if (grouping->choice->is_kept[i])
-			key[n++] = (struct key){ kind_of(c, grouping), morton_of(c->point.at), i };
+		if (m->grouping->choice->is_kept[i])
+			m->key[m->n++] = (struct key){ kind_of(c, m->grouping->is_two_sided, has_own), morton_of(c->point.at), i };
 	}
-	qsort(key, n, sizeof *key, compare);
-	set->n_groups = (uint32_t)cut_all(cut_group, key, n, surface);
-	for (uint32_t i = 0; i < set->n_groups; i++) {
-		const struct key *first = &key[cut_group[i].key.candidate];
+	qsort(m->key, m->n, sizeof *m->key, compare);
+	m->n_groups = cut_all(m->cut_group, m->key, m->n, surface);
+}
 
-		group[i] = cut_group[i].group;
+/* Rims of trimmed faces have many lengths, and two points of one length are seldom neighbours. Returns whether points
+ * have deltas of their own. */
+static int group_shortest(struct making *m)
+{
+	size_t shared, own;
+
+	group_all(m, 0);
+	shared = m->n_groups * sizeof(struct dpoint_group);
+	own = m->n * sizeof *((struct dpoint_set *)NULL)->delta;
+	if (shared <= own)
+		return 0;
+	group_all(m, 1);
+	if (own + m->n_groups * sizeof(struct dpoint_group) < shared)
+		return 1;
+	group_all(m, 0);
+	return 0;
+}
+
+static void put_words(struct dpoint_set *set, struct dpoint_group *group, struct dpoint_word *word, uint8_t (*delta)[2],
+                      const struct making *m)
+{
+	for (uint32_t i = 0; i < set->n_groups; i++) {
+		const struct key *first = &m->key[m->cut_group[i].key.candidate];
+
+		group[i] = m->cut_group[i].group;
 		group[i].first = set->n_points;
-		for (uint32_t k = 0; k < group[i].n; k++)
-			dpoint_pack(&word[set->n_points++], &surface->candidate[first[k].candidate].point, &group[i].box);
+		for (uint32_t k = 0; k < group[i].n; k++) {
+			const struct dpoint_candidate *c = &m->grouping->surface->candidate[first[k].candidate];
+
+			for (int side = 0; side < 2 && delta != NULL; side++)
+				delta[set->n_points][side] = (uint8_t)dpoint_delta_class(c->delta[side]);
+			dpoint_pack(&word[set->n_points++], &c->point, &group[i].box);
+		}
 	}
-	free(key);
-	free(cut_group);
-	return PSR_OK;
+}
+
+int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *grouping)
+{
+	const size_t room = grouping->choice->n_kept + 1;
+	struct making m = { .grouping = grouping, .key = malloc(room * sizeof *m.key),
+		                .cut_group = malloc(room * sizeof *m.cut_group) };
+	struct dpoint_group *group = malloc(room * sizeof *group);
+	struct dpoint_word *word = malloc(room * sizeof *word);
+	uint8_t (*delta)[2] = NULL;
+	int rc = room > UINT32_MAX ? PSR_ERR_LIMIT : PSR_OK;
+
+	*set = (struct dpoint_set){ .sine = grouping->sine, .group = group, .word = word };
+	if (rc == PSR_OK && (m.key == NULL || m.cut_group == NULL || group == NULL || word == NULL))
+		rc = PSR_ERR_MEMORY;
+	if (rc == PSR_OK && group_shortest(&m)) {
+		set->delta = (const uint8_t (*)[2])(delta = malloc(room * sizeof *delta));
+		rc = delta == NULL ? PSR_ERR_MEMORY : PSR_OK;
+	}
+	if (rc == PSR_OK) {
+		set->n_groups = (uint32_t)m.n_groups;
+		put_words(set, group, word, delta, &m);
+	}
+	free(m.key);
+	free(m.cut_group);
+	return rc;
 }
 
 void dpoint_set_fini(struct dpoint_set *set)
 {
 	free((void *)(uintptr_t)set->group);
 	free((void *)(uintptr_t)set->word);
+	free((void *)(uintptr_t)set->delta);
 	memset(set, 0, sizeof *set);
 }
 
@@ -178,7 +227,7 @@ static void corner_of(struct corner *c, const struct dpoint *p, const float exte
 static void point_of(struct dpoint *p, float extent[2], const struct dpoint_set *set, const struct dpoint_group *g,
                      uint32_t k)
 {
-	const struct dpoint_limit limit = dpoint_group_limit(set, g);
+	const struct dpoint_limit limit = dpoint_limit_of(set, g, k);
 
 	dpoint_unpack(p, &set->word[g->first + k], &g->box);
 	dpoint_extent(extent, p, &limit);

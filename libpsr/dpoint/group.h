@@ -1,11 +1,12 @@
 /* Points in groups of up to 64, as a file has them: each group has a box that its words count in, and one delta a
- * side. */
+ * side, or each point has its own. */
 #ifndef PSR_DPOINT_GROUP_H
 #define PSR_DPOINT_GROUP_H
 
 #include "surface.h"
 
 #define DPOINT_GROUP 64
+#define DPOINT_OWN_DELTA 255  /* the class of a group whose points have their own */
 #define DPOINT_MOST_BOX 0.16f /* of a side: half a step is below 2e-5, the slack of coverage */
 
 enum dpoint_group_flag {
@@ -16,7 +17,7 @@ struct dpoint_group {
 	struct dpoint_box box;
 	uint32_t first;      /* word */
 	uint8_t n;           /* words, 1..DPOINT_GROUP */
-	uint8_t delta[2];    /* classes, 0 to DPOINT_DELTA_CLASSES - 1 */
+	uint8_t delta[2];    /* classes, 0 to DPOINT_DELTA_CLASSES - 1; DPOINT_OWN_DELTA in a set with `delta` */
 	uint8_t flags;
 };
 _Static_assert(sizeof(struct dpoint_group) == 32, "groups are used as they are in files");
@@ -28,12 +29,15 @@ struct dpoint_set {
 	float height;        /* how far what is drawn is from the surface, at most; inner units */
 	const struct dpoint_group *group;
 	const struct dpoint_word *word;
+	const uint8_t (*delta)[2]; /* classes by word; NULL: points have those of their groups */
 };
 
-static inline struct dpoint_limit dpoint_group_limit(const struct dpoint_set *set, const struct dpoint_group *group)
+/* Returns what limits the extents of point k of a group. */
+static inline struct dpoint_limit dpoint_limit_of(const struct dpoint_set *set, const struct dpoint_group *group, uint32_t k)
 {
-	return (struct dpoint_limit){ set->sine,
-		                          { dpoint_delta_of_class(group->delta[0]), dpoint_delta_of_class(group->delta[1]) } };
+	const uint8_t *delta = set->delta != NULL ? set->delta[group->first + k] : group->delta;
+
+	return (struct dpoint_limit){ set->sine, { dpoint_delta_of_class(delta[0]), dpoint_delta_of_class(delta[1]) } };
 }
 
 /* The quadric that is drawn for a point: its height over the tangent plane at u, v. It is S_p's up to the fourth
@@ -61,9 +65,10 @@ struct dpoint_grouping {
 	const uint8_t *is_two_sided; /* by part; NULL: none is */
 };
 
-/* Makes groups of the kept candidates: those of one part's sides and deltas along a Morton curve, and groups along
- * another one. A delta that is no class becomes the next smaller one. The caller frees set->group and set->word by
- * dpoint_set_fini(). set->height is 0. MEMORY; LIMIT: 2^32 points. */
+/* Makes groups of the kept candidates: those of one part's sides along a Morton curve, and groups along another one.
+ * Points of a group have one delta, or all points have their own where that takes fewer bytes. A delta that is no class
+ * becomes the next smaller one. The caller frees set->group, set->word and set->delta by dpoint_set_fini(). set->height
+ * is 0. MEMORY; LIMIT: 2^32 points. */
 int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *grouping);
 void dpoint_set_fini(struct dpoint_set *set);
 

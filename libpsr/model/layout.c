@@ -68,6 +68,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_CALIBRATION_FINE] = { "CALF", 1, 0, COUNT_CALIBRATED, CALIBRATED_FINE_BYTES,
 	                               offsetof(struct content, calibration) + offsetof(struct psr_calibration, fine) },
 	[SECTION_ONE_MATERIAL] = TREE("OMT1", COUNT_ONE, 3, one_material),
+	[SECTION_DELTAS] = SET("DDLT", COUNT_DELTAS, 2, delta),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -102,6 +103,7 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 	case COUNT_GROUPS:
 		return content->points.n_groups;
 	case COUNT_POINTS:
+	case COUNT_DELTAS:
 		return content->points.n_points;
 	case COUNT_ONE:
 		break;
@@ -125,7 +127,7 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 
 	if (k == SECTION_CALIBRATION_FINE)
 		return !content->has_blocks;
-	if (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN)
+	if (k == SECTION_DELTAS || (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN))
 		return !content->has_points;
 	if ((k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE) || k >= SECTION_FIRST_OF_SCAN)
 		return !content->has_octree;
@@ -290,6 +292,8 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 /* The first version that knows all sections. */
 static unsigned minor_of(const struct content *content)
 {
+	if (is_present(SECTION_DELTAS, content))
+		return FILE_MINOR_DELTAS;
 	if (is_present(SECTION_MATERIAL, content) || is_present(SECTION_ONE_MATERIAL, content))
 		return FILE_MINOR_MATERIAL;
 	for (int k = SECTION_FIRST_OF_SCAN; k < SECTION_END_OF_SCAN; k++)

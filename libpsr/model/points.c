@@ -51,11 +51,14 @@ int model_check_point_counts(const struct dpoint_set *set, const char *name, str
 static int check_group(const struct dpoint_set *set, uint32_t i, uint64_t next, const char *name, struct psr_error *err)
 {
 	const struct dpoint_group *g = &set->group[i];
+	int is_bad = 0;
 
 	if (g->first != next || g->n == 0 || g->n > DPOINT_GROUP || g->n > set->n_points - next)
 		return fail("DGRP", "group %" PRIu32 " has %d points from %" PRIu32 " on; the next free one is %" PRIu64 " of %"
 		            PRIu32, i, g->n, g->first, next, set->n_points);
-	if (g->delta[0] >= DPOINT_DELTA_CLASSES || g->delta[1] >= DPOINT_DELTA_CLASSES || (g->flags & ~DPOINT_TWO_SIDED) != 0)
+	for (int k = 0; k < 2; k++)
+		is_bad |= set->delta != NULL ? g->delta[k] != DPOINT_OWN_DELTA : g->delta[k] >= DPOINT_DELTA_CLASSES;
+	if (is_bad || (g->flags & ~DPOINT_TWO_SIDED) != 0)
 		return fail("DGRP", "group %" PRIu32 " has deltas of classes %d and %d, and flags %d", i, g->delta[0], g->delta[1],
 		            g->flags);
 	for (int k = 0; k < 3; k++)
@@ -81,6 +84,9 @@ int model_validate_points(const struct dpoint_set *set, const char *name, struct
 	for (uint32_t i = 0; i < set->n_points; i++)
 		if (!dpoint_word_is_valid(&set->word[i]))
 			return fail("DWRD", "the curvatures of point %" PRIu32 " have no meaning", i);
+	for (uint32_t i = 0; i < set->n_points && set->delta != NULL; i++)
+		if (set->delta[i][0] >= DPOINT_DELTA_CLASSES || set->delta[i][1] >= DPOINT_DELTA_CLASSES)
+			return fail("DDLT", "point %" PRIu32 " has deltas of classes %d and %d", i, set->delta[i][0], set->delta[i][1]);
 	return PSR_OK;
 }
 

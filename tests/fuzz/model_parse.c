@@ -60,7 +60,9 @@ static void check_points(const struct dpoint_set *set)
 		const struct dpoint_group *g = &set->group[i];
 
 		REQUIRE(g->first == n_points && g->n > 0 && g->n <= DPOINT_GROUP);
-		REQUIRE(g->delta[0] < DPOINT_DELTA_CLASSES && g->delta[1] < DPOINT_DELTA_CLASSES);
+		for (uint32_t k = 0; k < g->n; k++)
+			for (int side = 0; side < 2; side++)
+				REQUIRE((set->delta != NULL ? set->delta[g->first + k] : g->delta)[side] < DPOINT_DELTA_CLASSES);
 		n_points += g->n;
 	}
 	REQUIRE(n_points == set->n_points);

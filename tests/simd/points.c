@@ -42,6 +42,7 @@ static struct scene *random_scene(struct check *c, uint32_t n_groups, uint32_t n
 	struct dpoint_group *group = check_in(c, n_groups, sizeof *group);
 	uint8_t *flags = check_in(c, n_groups, 1);
 	struct dpoint_word *word;
+	uint8_t (*delta)[2] = NULL;
 	uint32_t n = 0;
 
 	memset(s, 0, sizeof *s);
@@ -61,7 +62,16 @@ static struct scene *random_scene(struct check *c, uint32_t n_groups, uint32_t n
 	}
 	word = check_in(c, n, sizeof *word);
 	random_words(c, word, n, numbers);
-	s->set = (struct dpoint_set){ n_groups, n, (float)check_real(c, 0.01, 0.3), 0, group, word };
+	if (check_one_in(c, 3)) {
+		delta = check_in(c, n, sizeof *delta);
+		for (uint32_t i = 0; i < n; i++)
+			for (int k = 0; k < 2; k++)
+				delta[i][k] = (uint8_t)(n_points ? 16 : check_below(c, DPOINT_DELTA_CLASSES));
+		for (uint32_t i = 0; i < n_groups; i++)
+			group[i].delta[0] = group[i].delta[1] = DPOINT_OWN_DELTA;
+	}
+	s->set = (struct dpoint_set){ n_groups, n, (float)check_real(c, 0.01, 0.3), 0, group, word,
+		                          (const uint8_t (*)[2])delta };
 	s->points.groups = (struct psr_blocks){ .n_blocks = n_groups, .n_levels = 1, .flags = flags };
 	s->points.set = &s->set;
 	return s;

@@ -33,7 +33,6 @@ static inline void list_group(struct points_batch *b, const struct bin_entry *en
 	const struct warp_points *points = b->in->points;
 	const struct dpoint_set *set = points->model->set;
 	const struct dpoint_group *g = &set->group[entry->slot - b->in->first_slot];
-	const struct dpoint_limit limit = dpoint_group_limit(set, g);
 	const double low[3] = { g->box.low[0], g->box.low[1], g->box.low[2] };
 	const uint32_t first = b->p.n, n = g->n;
 
@@ -50,8 +49,11 @@ static inline void list_group(struct points_batch *b, const struct bin_entry *en
 		points_repeat(b->origin[k] + first, (float)at, n);
 		points_repeat(b->eye[k] + first, (float)(low[k] - points->eye[k]), n);
 	}
-	for (int k = 0; k < 2; k++)
-		points_repeat(b->delta[k] + first, limit.delta[k], n);
+	for (int k = 0; k < 2 && set->delta == NULL; k++)
+		points_repeat(b->delta[k] + first, dpoint_delta_of_class(g->delta[k]), n);
+	for (uint32_t i = 0; i < n && set->delta != NULL; i++)
+		for (int k = 0; k < 2; k++)
+			b->delta[k][first + i] = dpoint_delta_of_class(set->delta[g->first + i][k]);
 	b->p.n += n;
 }
 

@@ -308,9 +308,10 @@ static void groups_hold_all_points_and_what_they_draw(void **state)
 	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
 	assert_int_equal(dpoint_set_make(&set, &(struct dpoint_grouping){ &surface, &choice, o.sine, NULL }), PSR_OK);
 	assert_int_equal(set.n_points, choice.n_kept);
+	assert_null(set.delta);
 	for (uint32_t i = 0; i < set.n_groups; i++) {
 		const struct dpoint_group *g = &set.group[i];
-		const struct dpoint_limit limit = dpoint_group_limit(&set, g);
+		const struct dpoint_limit limit = dpoint_limit_of(&set, g, 0);
 		struct dpoint_sphere sphere;
 		float axis[3], cosine;
 
@@ -357,6 +358,59 @@ static void groups_hold_all_points_and_what_they_draw(void **state)
 	dpoint_surface_fini(&surface);
 }
 
+/* Sixteen deltas at random: of 16 neighbours hardly two share one. A group of each takes 32 bytes a point, groups of
+ * all 32 a group and 2 a point. */
+static void points_have_their_own_deltas_where_that_is_shorter(void **state)
+{
+	const struct dpoint_cover_options o = options(0.02, 3);
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+	struct dpoint_set set;
+	struct revolved torus;
+	uint64_t seed = 4;
+	uint32_t n = 0;
+
+	(void)state;
+	revolve(&torus, 0.6, 0.3, 0, 9);
+	sample(&surface, &torus.patch, 20, 0.2f);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &o, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
+	for (uint32_t i = 0; i < surface.n_candidates; i++)
+		for (int k = 0; k < 2; k++)
+			surface.candidate[i].delta[k] = dpoint_delta_of_class(10 + (unsigned)(4 * random_in(&seed, 0, 0.999)));
+	assert_int_equal(dpoint_set_make(&set, &(struct dpoint_grouping){ &surface, &choice, o.sine, NULL }), PSR_OK);
+	assert_int_equal(set.n_points, choice.n_kept);
+	assert_non_null(set.delta);
+	assert_true(sizeof *set.group * set.n_groups + 2 * set.n_points < sizeof *set.group * set.n_points);
+	for (uint32_t i = 0; i < set.n_groups; i++)
+		for (uint32_t k = 0; k < set.group[i].n; k++, n++) {
+			const struct dpoint_limit limit = dpoint_limit_of(&set, &set.group[i], k);
+			const struct dpoint_candidate *own = NULL;
+			float nearest = INFINITY, away[3];
+			struct dpoint p;
+
+			assert_int_equal(set.group[i].delta[0], DPOINT_OWN_DELTA);
+			assert_int_equal(set.group[i].delta[1], DPOINT_OWN_DELTA);
+			dpoint_unpack(&p, &set.word[n], &set.group[i].box);
+			for (uint32_t c = 0; c < surface.n_candidates; c++) {
+				v3f_sub(away, p.at, surface.candidate[c].point.at);
+				if (choice.is_kept[c] && v3f_dot(away, away) < nearest) {
+					nearest = v3f_dot(away, away);
+					own = &surface.candidate[c];
+				}
+			}
+			/* Places are half a step off on each axis. */
+			assert_true(nearest <= 3 * 2.1e-5f * 2.1e-5f);
+			assert_true(limit.delta[0] == own->delta[0] && limit.delta[1] == own->delta[1]);
+		}
+	assert_int_equal(n, set.n_points);
+	dpoint_set_fini(&set);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+}
+
 static void of_nothing_nothing_is_chosen(void **state)
 {
 	const struct dpoint_cover_options o = options(0.02, 3);
@@ -388,6 +442,7 @@ int main(void)
 		cmocka_unit_test(no_ray_slips_between_the_chosen_rectangles),
 		cmocka_unit_test(threads_choose_the_same),
 		cmocka_unit_test(groups_hold_all_points_and_what_they_draw),
+		cmocka_unit_test(points_have_their_own_deltas_where_that_is_shorter),
 		cmocka_unit_test(of_nothing_nothing_is_chosen),
 	};
 

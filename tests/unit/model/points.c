@@ -14,8 +14,22 @@
 #include "model/file.h"
 
 static struct fixture fixture;
-static struct dpoint_set set;
-static struct psr_model *alone, *with_blocks;
+static struct dpoint_set set;    /* whose points have deltas of their own */
+static struct dpoint_set shared; /* the same with a delta a group */
+static struct psr_model *alone, *with_blocks, *of_shared;
+
+static void make_shared(void)
+{
+	struct dpoint_group *group = malloc(set.n_groups * sizeof *group);
+
+	shared = set;
+	shared.delta = NULL;
+	shared.group = memcpy(group, set.group, set.n_groups * sizeof *group);
+	for (uint32_t i = 0; i < set.n_groups; i++)
+		group[i].delta[0] = group[i].delta[1] = (uint8_t)(12 + i % 4);
+	assert_int_equal(psr_model_create_of(&of_shared, &fixture.info, &(struct psr_model_parts){ .points = &shared }, NULL,
+	                                     NULL), PSR_OK);
+}
 
 static int setup(void **state)
 {
@@ -30,6 +44,8 @@ static int setup(void **state)
 	assert_int_equal(psr_model_create_of(&with_blocks, &fixture.info,
 	                                     &(struct psr_model_parts){ .blocks = &fixture.blocks, .points = &set }, NULL,
 	                                     NULL), PSR_OK);
+	assert_non_null(set.delta);
+	make_shared();
 	return 0;
 }
 
@@ -38,28 +54,33 @@ static int teardown(void **state)
 	(void)state;
 	psr_model_unref(alone);
 	psr_model_unref(with_blocks);
+	psr_model_unref(of_shared);
+	free((void *)(uintptr_t)shared.group);
 	dpoint_set_fini(&set);
 	return 0;
 }
 
-static void assert_set(const struct dpoint_set *other)
+static void assert_set(const struct dpoint_set *other, const struct dpoint_set *like)
 {
-	assert_int_equal(other->n_groups, set.n_groups);
-	assert_int_equal(other->n_points, set.n_points);
-	assert_true(other->sine == set.sine && other->height == set.height);
-	assert_memory_equal(other->group, set.group, set.n_groups * sizeof *set.group);
-	assert_memory_equal(other->word, set.word, set.n_points * sizeof *set.word);
+	assert_int_equal(other->n_groups, like->n_groups);
+	assert_int_equal(other->n_points, like->n_points);
+	assert_true(other->sine == like->sine && other->height == like->height);
+	assert_memory_equal(other->group, like->group, like->n_groups * sizeof *like->group);
+	assert_memory_equal(other->word, like->word, like->n_points * sizeof *like->word);
+	assert_int_equal(other->delta == NULL, like->delta == NULL);
+	if (like->delta != NULL)
+		assert_memory_equal(other->delta, like->delta, like->n_points * sizeof *like->delta);
 }
 
 static void points_survive_file_map_and_packing(void **state)
 {
 	char folder[] = "/tmp/psr-model-XXXXXX", path[64];
-	struct psr_model *const models[2] = { alone, with_blocks };
+	struct psr_model *const models[3] = { alone, with_blocks, of_shared };
 
 	(void)state;
 	assert_non_null(mkdtemp(folder));
 	snprintf(path, sizeof path, "%s/a.psr", folder);
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < 3; i++)
 		for (int way = 0; way < 4; way++) {
 			struct psr_model *model = NULL;
 			uint8_t id[16], other[16];
@@ -70,7 +91,7 @@ static void points_survive_file_map_and_packing(void **state)
 			else
 				assert_int_equal(psr_model_write_packed(models[i], path, NULL), PSR_OK);
 			assert_int_equal(way % 2 ? psr_model_map(&model, path, NULL) : psr_model_read(&model, path, NULL), PSR_OK);
-			assert_set(psr_model_point_set(model));
+			assert_set(psr_model_point_set(model), i == 2 ? &shared : &set);
 			assert_int_equal(psr_model_blocks(model) != NULL, i == 1);
 			psr_model_content_id(models[i], id);
 			psr_model_content_id(model, other);
@@ -84,20 +105,19 @@ static void points_survive_file_map_and_packing(void **state)
 }
 
 /* Half of what a step of the arrays is, and what rounding may add. */
-static void spheres_cones_and_clusters_hold_what_is_drawn(void **state)
+static void check_bounds(const struct psr_model *model)
 {
-	const struct psr_points *points = psr_model_points(alone);
+	const struct psr_points *points = psr_model_points(model);
+	const struct dpoint_set *of = points->set;
 	const struct psr_blocks *b = &points->groups;
 	uint64_t seed = 5;
 
-	(void)state;
-	assert_int_equal(b->n_blocks, set.n_groups);
-	assert_int_equal(b->n_samples, set.n_points);
+	assert_int_equal(b->n_blocks, of->n_groups);
+	assert_int_equal(b->n_samples, of->n_points);
 	for (uint32_t c = 0, next = 0; c < b->n_clusters; next += b->cluster[c++].n_blocks)
 		assert_int_equal(b->cluster[c].first_block, next);
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		const struct dpoint_group *g = &set.group[i];
-		const struct dpoint_limit limit = dpoint_group_limit(&set, g);
+		const struct dpoint_group *g = &of->group[i];
 		const struct psr_cluster *cluster = &b->cluster[i / POINTS_CLUSTER];
 		float center[3], radius, axis[3] = { b->cone_x[i], b->cone_y[i], b->cone_z[i] };
 		const float sine = b->cone_sine[i] == PSR_CONE_ANY ? 2 : (float)b->cone_sine[i] / 255;
@@ -106,10 +126,11 @@ static void spheres_cones_and_clusters_hold_what_is_drawn(void **state)
 		v3f_normalize(axis, axis);
 		assert_true(b->mask[i] == (g->n == 64 ? UINT64_MAX : (UINT64_C(1) << g->n) - 1));
 		for (uint32_t k = 0; k < g->n; k++) {
+			const struct dpoint_limit limit = dpoint_limit_of(of, g, k);
 			struct dpoint p;
 			float extent[2], v[3];
 
-			dpoint_unpack(&p, &set.word[g->first + k], &g->box);
+			dpoint_unpack(&p, &of->word[g->first + k], &g->box);
 			dpoint_extent(extent, &p, &limit);
 			v3f_cross(v, p.normal, p.u);
 			for (int place = 0; place < 20; place++) {
@@ -133,6 +154,13 @@ static void spheres_cones_and_clusters_hold_what_is_drawn(void **state)
 			}
 		}
 	}
+}
+
+static void spheres_cones_and_clusters_hold_what_is_drawn(void **state)
+{
+	(void)state;
+	check_bounds(alone);
+	check_bounds(of_shared);
 }
 
 static void what_is_no_set_makes_no_model(void **state)
@@ -159,14 +187,34 @@ static void what_is_no_set_makes_no_model(void **state)
 
 /* ---- files ---- */
 
+struct edit {
+	const char *section;
+	int at, size;
+	uint64_t value;
+	const char *text;
+};
+
+static void check_edits(const struct psr_model *of, const struct edit *edit, size_t n_edits)
+{
+	for (size_t i = 0; i < n_edits; i++) {
+		struct psr_model *model = NULL;
+		struct psr_error err = { 0 };
+		size_t n;
+		uint8_t *copy = copy_of(of, &n);
+
+		file_put(copy + file_get(entry_of(copy, edit[i].section) + ENTRY_OFFSET, 8) + edit[i].at, edit[i].size,
+		         edit[i].value);
+		file_seal(copy, n);
+		assert_int_equal(psr_model_parse(&model, copy, n, &err), PSR_ERR_FORMAT);
+		if (strstr(err.text, edit[i].text) == NULL)
+			fail_msg("edit %zu: %s", i, err.text);
+		free(copy);
+	}
+}
+
 static void lies_are_refused(void **state)
 {
-	static const struct {
-		const char *section;
-		int at, size;
-		uint64_t value;
-		const char *text;
-	} edits[] = {
+	static const struct edit own[] = {
 		{ "DPNT", 0, 4, 0, "section DPNT: 0 groups" },
 		{ "DPNT", 0, 4, UINT32_MAX, "section DPNT: 4294967295 groups" },
 		{ "DPNT", 0, 4, 1, "points do not fit 1 groups" },
@@ -183,28 +231,22 @@ static void lies_are_refused(void **state)
 		{ "DGRP", 24, 4, 1, "section DGRP: group 0 has" },
 		{ "DGRP", 28, 1, 0, "section DGRP: group 0 has 0 points from 0 on" },
 		{ "DGRP", 28, 1, 65, "section DGRP: group 0 has 65 points" },
-		{ "DGRP", 29, 1, 64, "section DGRP: group 0 has deltas of classes 64" },
-		{ "DGRP", 30, 1, 255, "and 255, and flags 0" },
+		{ "DGRP", 29, 1, 63, "section DGRP: group 0 has deltas of classes 63 and 255" },
+		{ "DGRP", 30, 1, 64, "section DGRP: group 0 has deltas of classes 255 and 64" },
+		{ "DDLT", 0, 1, 64, "section DDLT: point 0 has deltas of classes 64" },
+		{ "DDLT", 2 * 3 + 1, 1, 255, "section DDLT: point 3 has deltas of classes" },
 		{ "DGRP", 31, 1, 2, "and flags 2" },
 		{ "DWRD", 16 * 3, 8, UINT64_MAX, "section DWRD: the curvatures of point 3" },
 		{ "DWRD", 16 * 3, 8, (uint64_t)128 << 49, "section DWRD: the curvatures of point 3" },
 	};
+	static const struct edit of_groups[] = {
+		{ "DGRP", 29, 1, 64, "section DGRP: group 0 has deltas of classes 64" },
+		{ "DGRP", 30, 1, 255, "and 255, and flags 0" },
+	};
 
 	(void)state;
-	for (size_t i = 0; i < sizeof edits / sizeof edits[0]; i++) {
-		struct psr_model *model = NULL;
-		struct psr_error err = { 0 };
-		size_t n;
-		uint8_t *copy = copy_of(alone, &n);
-
-		file_put(copy + file_get(entry_of(copy, edits[i].section) + ENTRY_OFFSET, 8) + edits[i].at, edits[i].size,
-		         edits[i].value);
-		file_seal(copy, n);
-		assert_int_equal(psr_model_parse(&model, copy, n, &err), PSR_ERR_FORMAT);
-		if (strstr(err.text, edits[i].text) == NULL)
-			fail_msg("edit %zu: %s", i, err.text);
-		free(copy);
-	}
+	check_edits(alone, own, sizeof own / sizeof own[0]);
+	check_edits(of_shared, of_groups, sizeof of_groups / sizeof of_groups[0]);
 }
 
 /* A section's name spoilt is a section that this build does not know. */
@@ -229,6 +271,33 @@ static void a_set_of_sections_is_whole(void **state)
 		}
 }
 
+/* What a psr of 6.4 does: it must not draw points as wide as some group's delta. */
+static void points_without_their_deltas_are_refused(void **state)
+{
+	struct psr_model *model = NULL;
+	struct psr_error err = { 0 };
+	size_t n;
+	uint8_t *copy = copy_of(alone, &n);
+
+	(void)state;
+	memcpy(entry_of(copy, "DDLT"), "ZZZ1", 4);
+	file_seal(copy, n);
+	assert_int_equal(psr_model_parse(&model, copy, n, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "section DGRP: group 0 has deltas of classes 255 and 255"));
+	free(copy);
+	copy = copy_of(with_blocks, &n);
+	memcpy(entry_of(copy, "DPNT"), "ZZZ1", 4);
+	memcpy(entry_of(copy, "DGRP"), "ZZZ2", 4);
+	memcpy(entry_of(copy, "DWRD"), "ZZZ3", 4);
+	file_seal(copy, n);
+	assert_int_equal(psr_model_parse(&model, copy, n, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "section DDLT is there, and DPNT, which tells its length, is missing"));
+	free(copy);
+	copy = copy_of(of_shared, &n);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), FILE_MINOR_POINTS);
+	free(copy);
+}
+
 /* An older psr, which knows none of these sections, reads the blocks. */
 static void sections_of_points_are_not_required(void **state)
 {
@@ -237,10 +306,11 @@ static void sections_of_points_are_not_required(void **state)
 	uint8_t *copy = copy_of(with_blocks, &n);
 
 	(void)state;
-	assert_int_equal(file_get(copy + HEADER_MINOR, 2), FILE_MINOR_POINTS);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), FILE_MINOR_DELTAS);
 	memcpy(entry_of(copy, "DPNT"), "ZZZ1", 4);
 	memcpy(entry_of(copy, "DGRP"), "ZZZ2", 4);
 	memcpy(entry_of(copy, "DWRD"), "ZZZ3", 4);
+	memcpy(entry_of(copy, "DDLT"), "ZZZ4", 4);
 	file_seal(copy, n);
 	assert_int_equal(psr_model_parse(&model, copy, n, NULL), PSR_OK);
 	assert_null(psr_model_points(model));
@@ -258,6 +328,7 @@ int main(void)
 		cmocka_unit_test(what_is_no_set_makes_no_model),
 		cmocka_unit_test(lies_are_refused),
 		cmocka_unit_test(a_set_of_sections_is_whole),
+		cmocka_unit_test(points_without_their_deltas_are_refused),
 		cmocka_unit_test(sections_of_points_are_not_required),
 	};
 

@@ -133,8 +133,7 @@ static void rectangles_end_where_colours_do(void **state)
 	assert_true((double)report.n_kept < 0.1 * M_PI * resolution * resolution);
 	for (uint32_t i = 0; i < set.n_groups; i++)
 		for (uint32_t k = 0; k < set.group[i].n; k++) {
-			const struct dpoint_limit limit = { set.sine, { dpoint_delta_of_class(set.group[i].delta[0]),
-				                                            dpoint_delta_of_class(set.group[i].delta[1]) } };
+			const struct dpoint_limit limit = dpoint_limit_of(&set, &set.group[i], k);
 			float extent[2], v[3];
 			struct dpoint p;
 			double reach;

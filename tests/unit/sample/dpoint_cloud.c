@@ -74,7 +74,7 @@ static int make(struct dpoint_set *set, struct psr_model_info *info, struct dpoi
 /* Whether a point's rectangle is over the place, and its quadric within `off` of it. */
 static int covers(const struct dpoint_set *set, const struct dpoint_group *g, uint32_t i, const float at[3], float off)
 {
-	const struct dpoint_limit limit = dpoint_group_limit(set, g);
+	const struct dpoint_limit limit = dpoint_limit_of(set, g, i);
 	float away[3], v[3], extent[2], u, w;
 	struct dpoint p;
 
@@ -157,10 +157,9 @@ static void a_bowl_ends_at_its_rim(void **state)
 	(void)state;
 	assert_int_equal(make(&set, &info, &report, mesh, 0, &err), PSR_OK);
 	for (uint32_t i = 0; i < set.n_groups; i++) {
-		const struct dpoint_limit limit = dpoint_group_limit(&set, &set.group[i]);
-
 		assert_int_equal(set.group[i].flags, DPOINT_TWO_SIDED);
 		for (uint32_t k = 0; k < set.group[i].n; k++) {
+			const struct dpoint_limit limit = dpoint_limit_of(&set, &set.group[i], k);
 			struct dpoint p;
 			float extent[2], v[3];
 

@@ -126,7 +126,7 @@ static double off_by(const struct dpoint_set *set, const struct psr_model_info *
 		                                           info->origin[i % 3]) / info->scale);
 	for (uint32_t g = 0; g < set->n_groups; g++)
 		for (uint32_t k = 0; k < set->group[g].n; k++) {
-			const struct dpoint_limit limit = dpoint_group_limit(set, &set->group[g]);
+			const struct dpoint_limit limit = dpoint_limit_of(set, &set->group[g], k);
 			float extent[2], v[3];
 			struct dpoint p;
 			size_t n;
