@@ -22,8 +22,8 @@ static double pixels_of(const struct dpoint_set *set, const struct psr_model_inf
 
 void info_print_points(const struct dpoint_set *set, const struct psr_model_info *info, uint64_t file_bytes)
 {
-	printf("points            %" PRIu32 " differential points in %" PRIu32 " groups, %.1f bytes a point; %.1f in the file\n",
-	       set->n_points, set->n_groups, bytes_of(set), (double)file_bytes / set->n_points);
+	printf("points            %" PRIu32 " differential points in %" PRIu32 " groups, %.1f bytes a point; %.1f in the "
+	       "file\n", set->n_points, set->n_groups, bytes_of(set), (double)file_bytes / set->n_points);
 	printf("  epsilon         %.4g\n", epsilon_of(set));
 	printf("  off by          %.3g at most, %.3g pixels of the resolution\n", (double)set->height * info->scale,
 	       pixels_of(set, info));

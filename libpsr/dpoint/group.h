@@ -33,7 +33,8 @@ struct dpoint_set {
 };
 
 /* Returns what limits the extents of point k of a group. */
-static inline struct dpoint_limit dpoint_limit_of(const struct dpoint_set *set, const struct dpoint_group *group, uint32_t k)
+static inline struct dpoint_limit dpoint_limit_of(const struct dpoint_set *set, const struct dpoint_group *group,
+                                                  uint32_t k)
 {
 	const uint8_t *delta = set->delta != NULL ? set->delta[group->first + k] : group->delta;
 
