@@ -1,5 +1,5 @@
-/* Bounds of runs of cubes, so that a frame leaves 64 of them out at once, and of bunches of clusters, so that it chooses the
- * level of 64 at once. */
+/* Bounds of runs of cubes, so that a frame leaves 64 of them out at once, and of bunches of clusters, so that it
+ * chooses the level of 64 at once. */
 #include <math.h>
 #include "cubes_make.h"
 

@@ -6,8 +6,8 @@
 #include "plan.h"
 
 /* A crack is one pixel wide, and of at most so many pixels that touch each other. All around is what is nearer by more
- * than level 1's threshold, the nearest of it a differential point, and so far apart in depth at most. Measured: openings
- * that are there are seldom so small, and what is around them seldom so near to each other. */
+ * than level 1's threshold, the nearest of it a differential point, and so far apart in depth at most. Measured:
+ * openings that are there are seldom so small, and what is around them seldom so near to each other. */
 #define CRACK_MOST 12
 #define CRACK_SHORT 4
 #define CRACK_APART 12 /* spacings of the model's resolution; half of it if the crack is longer than CRACK_SHORT */

@@ -12,8 +12,8 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 
 #define CULL_MOST_CHUNK 2048 /* blocks, or chosen cubes, of a chunk */
 
-/* Blocks first_block .. first_block + n_blocks - 1, of cubes of one level the chosen ones among these; first_cluster holds
- * the first, or comes before the cluster that does. n_drawn: blocks or cubes, where n_hits are entries of runs. */
+/* Blocks first_block .. first_block + n_blocks - 1, of cubes of one level the chosen ones among these; first_cluster
+ * holds the first, or comes before the cluster that does. n_drawn: blocks or cubes; n_hits: of runs, entries. */
 struct cull_chunk {
 	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits, n_drawn;
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;

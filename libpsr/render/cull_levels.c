@@ -102,8 +102,8 @@ static void choose_of_blocks(struct cull_group *group, const struct plan *plan, 
 
 /* ---- cubes: each level has a cluster of each group, in the order of groups ---- */
 
-/* Returns a level above which none fits: where a unit of length spans least pixels, at the sphere's farthest, samples are
- * more than a pixel apart already. What is before the eye only in part tells nothing. */
+/* Returns a level above which none fits: where a unit of length spans least pixels, at the sphere's farthest, samples
+ * are more than a pixel apart already. What is before the eye only in part tells nothing. */
 static unsigned coarsest_of(const struct plan *plan, const struct plan_instance *in, const struct cull_sphere *v,
                             unsigned level)
 {

@@ -1,6 +1,6 @@
-/* Cubes by runs of 64: those of a run that are drawn alike, in the same tiles, are one hit. Most runs are in one tile and
- * before the eye, and what their cubes' flags say decides the depth buffer: then the run's bound tells all but how its
- * cubes face. */
+/* Cubes by runs of 64: those of a run that are drawn alike, in the same tiles, are one hit. Most runs are in one tile
+ * and before the eye, and what their cubes' flags say decides the depth buffer: then the run's bound tells all but how
+ * its cubes face. */
 #include "base/vec.h"
 #include "cull.h"
 
@@ -128,8 +128,8 @@ static void find_stretch(float stretch[2], const struct cull_view *v, const stru
 	stretch[1] = v->focal * (1 - ROUNDING) * (!v->perspective ? 1 : (side > far ? side : far) / (far * far));
 }
 
-/* Finds the tile of an axis that holds all which the sphere's samples can reach. Returns whether it is one, and the sphere
- * within the picture. */
+/* Finds the tile of an axis that holds all which the sphere's samples can reach. Returns whether it is one, and the
+ * sphere within the picture. */
 static int find_tile(int32_t *tile, const float bound[2], float size, int32_t tile_size)
 {
 	const float most = size - 1;
@@ -157,8 +157,8 @@ struct told {
 	int widest;
 };
 
-/* Returns whether all cubes of a run are in the picture, within one tile, and those that are as wide need the depth buffer
- * of one level. */
+/* Returns whether all cubes of a run are in the picture, within one tile, and those that are as wide need the depth
+ * buffer of one level. */
 static int find_alike_by_bound(struct told *out, const struct plan *plan, const struct plan_instance *in,
                                const struct chosen *run, const struct cull_sphere *sphere)
 {

@@ -23,7 +23,7 @@ static void close_cracks(struct gaps_counts *counts, uint8_t *marks, const struc
 {
 	const struct psr_zstack *stack = target->stack;
 
-	for (uint32_t i = 0; i < counts->n_slits; i++) {
+	for (uint32_t i = 0; i < counts->n_slits && !plan_is_cancelled_at(plan, i); i++) {
 		const uint32_t beside = target->slit[i] % GAPS_WIDTH, x = x0 + beside, y = y0 + target->slit[i] / GAPS_WIDTH;
 		uint16_t *weight = &target->weight[(size_t)y * stack->width + x];
 

@@ -29,7 +29,7 @@ static inline warp_fn *kernel_of(const struct simd *simd, const struct plan *pla
 	return in->cubes == NULL ? simd->warp : plan->with_ewa ? simd->ewa_words : simd->warp_leaves;
 }
 
-/* How much of a run between two questions an entry takes: points of a group, cubes of a run, or 0 for what callers count. */
+/* How much of a run between two questions an entry takes: points of a group, cubes of a run, or 0: callers count. */
 static inline uint32_t work_of(const struct plan *plan, const struct warp_target *target, const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &plan->warp[entry->instance];

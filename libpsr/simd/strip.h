@@ -99,8 +99,8 @@ typedef void strip_light_fn(struct strip *strip, const struct strip_light *light
 /* Tabulates light by normal, as strip_light gives it, for normals first .. first + n - 1; n at most STRIP. */
 typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_lights *lights,
                           uint32_t first, uint32_t n);
-/* Multiplies light and colours into 16 bits: linear up to 1, or if is_wide those of base/root.h. Adds ambient light where
- * !is_specular. Unlit samples keep their base colour. */
+/* Multiplies light and colours into 16 bits: linear up to 1, or if is_wide those of base/root.h. Adds ambient light
+ * where !is_specular. Unlit samples keep their base colour. */
 typedef void strip_color_fn(struct strip *strip, const float ambient[3], int is_wide);
 
 #define STRIP_BRICK 32 /* pixels of a row that share one flag in `wants` */

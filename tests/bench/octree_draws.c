@@ -6,9 +6,9 @@
  * their times are medians; then those of stages. Points a second are those of cull and warp together, splats likewise;
  * the latter have a target, of two threads at 512x512 and leaves of about a pixel.
  *
- * The same picture takes samples as dense. Octrees have leaves of a power of two, blocks any resolution: -b builds blocks
- * of the mesh ("even") whose samples are as far apart as those of the leaves, so that frames take a level of either at the
- * same distance (model/cubes.h, CUBES_LEVEL_SPACING). All spacings are printed. */
+ * The same picture takes samples as dense. Octrees have leaves of a power of two, blocks any resolution: -b builds
+ * blocks of the mesh ("even") whose samples are as far apart as those of the leaves, so that frames take a level of
+ * either at the same distance (model/cubes.h, CUBES_LEVEL_SPACING). All spacings are printed. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -97,7 +97,8 @@ static int read_mesh(struct octree **tree, struct psr_model **even, const char *
 }
 
 /* In the inner coordinates of the blocks, or its own. */
-static int make_model(struct psr_model **out, struct octree *tree, const struct psr_model *blocks, struct psr_error *err)
+static int make_model(struct psr_model **out, struct octree *tree, const struct psr_model *blocks,
+                      struct psr_error *err)
 {
 	struct psr_model_info info = { .up = { 0, 1, 0 }, .resolution = 1u << (tree->levels < 16 ? tree->levels : 16) };
 

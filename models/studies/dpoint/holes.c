@@ -56,8 +56,9 @@ static int count(uint64_t *n_holes, uint64_t *n_inside, const struct study *stud
 }
 
 /* Draws all views of a size; of two models the second is blocks. */
-static int draw_views(uint64_t n_holes[2], uint64_t *n_inside, const struct study *study, struct psr_model *const model[2],
-                      struct psr_truth *truth, const struct study_model *of, double times)
+static int draw_views(uint64_t n_holes[2], uint64_t *n_inside, const struct study *study,
+                      struct psr_model *const model[2], struct psr_truth *truth, const struct study_model *of,
+                      double times)
 {
 	const uint32_t side = (uint32_t)fmin(SIDE, study->resolution * times);
 	struct psr_instance instance = { .rotation = { 0, 0, 0, 1 }, .scale = 1 };

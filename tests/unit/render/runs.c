@@ -77,8 +77,8 @@ static void cull(struct drawn *to, const struct psr_scene *scene, const struct r
 	plan_clear(&plan);
 }
 
-/* What bounds a run may be wider than what bounds its cubes, and more may be known of how they face. Returns whether any is
- * drawn. */
+/* What bounds a run may be wider than what bounds its cubes, and more may be known of how they face. Returns whether
+ * any is drawn. */
 static int check_same(const struct psr_scene *scene, const struct render_settings *settings)
 {
 	struct drawn runs, single;
@@ -113,8 +113,8 @@ static double random_of(uint64_t *state, double low, double high)
 	return low + (high - low) * (double)(*state >> 11) * 0x1p-53;
 }
 
-/* From near, from far and from within; a third of it without perspective. Two instances, one of which is turned. Returns
- * in how many views `check` finds something. */
+/* From near, from far and from within; a third of it without perspective. Two instances, one of which is turned.
+ * Returns in how many views `check` finds something. */
 static int check_each_view(const struct tree_options *options, int n,
                            int (*check)(const struct psr_scene *scene, const struct render_settings *settings))
 {
