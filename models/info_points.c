@@ -6,8 +6,7 @@
 
 static double bytes_of(const struct dpoint_set *set)
 {
-	return (double)sizeof *set->word + (double)sizeof *set->group * set->n_groups / set->n_points +
-	       (set->delta != NULL ? sizeof *set->delta : 0);
+	return (double)dpoint_set_bytes(set) / set->n_points;
 }
 
 static double epsilon_of(const struct dpoint_set *set)

@@ -32,6 +32,14 @@ struct dpoint_set {
 	const uint8_t (*delta)[2]; /* classes by word; NULL: points have those of their groups */
 };
 
+/* Returns how many bytes words, groups and deltas take, in memory as in a plain file. */
+static inline size_t dpoint_set_bytes(const struct dpoint_set *set)
+{
+	const size_t point = sizeof *set->word + (set->delta != NULL ? sizeof *set->delta : 0);
+
+	return set->n_points * point + set->n_groups * sizeof *set->group;
+}
+
 /* Returns what limits the extents of point k of a group. */
 static inline struct dpoint_limit dpoint_limit_of(const struct dpoint_set *set, const struct dpoint_group *group,
                                                   uint32_t k)

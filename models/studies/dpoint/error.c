@@ -28,7 +28,7 @@ static int measure(double value[N_COLUMNS], const struct study_model *model, dou
 	rc = dpoint_of_mesh(&set, &info, &report, model->mesh, &options, study->err);
 	if (rc == PSR_OK) {
 		value[POINTS] = set.n_points;
-		value[BYTES] = (double)(set.n_points * sizeof *set.word + set.n_groups * sizeof *set.group) / 1e3;
+		value[BYTES] = (double)dpoint_set_bytes(&set) / 1e3;
 		value[SECONDS] = report.seconds;
 		value[OFF] = report.off_worst;
 		value[OVER] = (double)report.n_over;

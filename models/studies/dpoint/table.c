@@ -112,7 +112,7 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 		put(value, row, &surface, &choice, &errors);
 	}
 	if (rc == PSR_OK && row->way == FITTED)
-		value[BYTES] = (double)(set.n_points * sizeof *set.word + set.n_groups * sizeof *set.group) / 1e3;
+		value[BYTES] = (double)dpoint_set_bytes(&set) / 1e3;
 	dpoint_set_fini(&set);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
