@@ -29,6 +29,16 @@ struct bounding {
 	double *place;
 };
 
+static inline double lesser(double a, double b)
+{
+	return b < a ? b : a;
+}
+
+static inline double greater(double a, double b)
+{
+	return b > a ? b : a;
+}
+
 /* ---- distances ---- */
 
 static void place_at(double p[3], const struct bound_view *view, double u, double v)
@@ -88,8 +98,8 @@ static int cut_part(struct part side[2], const struct part *part, const double l
 
 	for (int i = 0; i < part->n; i++) {
 		value[i] = line[0] * part->corner[i][0] + line[1] * part->corner[i][1] + line[2];
-		low = fmin(low, value[i]);
-		high = fmax(high, value[i]);
+		low = lesser(low, value[i]);
+		high = greater(high, value[i]);
 	}
 	side[0].n = side[1].n = 0;
 	if (-low <= least || high <= least)
@@ -155,8 +165,8 @@ static void box_of(double low[3], double high[3], const struct bound_view *view,
 	for (int k = 0; k < 2; k++) {
 		low[k] = high[k] = part->corner[0][k];
 		for (int i = 1; i < part->n; i++) {
-			low[k] = fmin(low[k], part->corner[i][k]);
-			high[k] = fmax(high[k], part->corner[i][k]);
+			low[k] = lesser(low[k], part->corner[i][k]);
+			high[k] = greater(high[k], part->corner[i][k]);
 		}
 	}
 	bound_rise(w, view, low, high);
@@ -188,7 +198,7 @@ static int part_holds(const struct bounding *b, const struct part *part, size_t 
 	place_at(middle, view, b->place[0], b->place[1]);
 	for (int k = 0; k < 2; k++)
 		bend[k] = (k == 0 ? view->a : view->b) * (high[k] - low[k]) * (high[k] - low[k]) / 16;
-	size = fmax(high[0] - low[0], high[1] - low[1]);
+	size = greater(high[0] - low[0], high[1] - low[1]);
 	axis = high[1] - low[1] > high[0] - low[0];
 	if (!filter(b, begin, end, low, high))
 		return 0;
@@ -209,7 +219,7 @@ static int part_holds(const struct bounding *b, const struct part *part, size_t 
 	}
 	if (size <= b->error / FINEST || depth >= MOST_DEPTH)
 		return 0;
-	if (seen == NULL || part->n > MOST_CORNERS - 4 || !cut_along(side, part, seen, fmin(size, b->error) / 16)) {
+	if (seen == NULL || part->n > MOST_CORNERS - 4 || !cut_along(side, part, seen, lesser(size, b->error) / 16)) {
 		double line[3] = { axis == 0, axis == 1, -0.5 * (low[axis] + high[axis]) };
 
 		if (!cut_part(side, part, line, 0))
@@ -235,7 +245,7 @@ static int outline_holds(const struct bounding *b, const float extent[2])
 	return 1;
 }
 
-int bound_holds(struct bound_view *view, const float extent[2], double error, double place[2])
+static int holds(struct bound_view *view, const float extent[2], double error, double place[2], int is_likely)
 {
 	const double u = extent[0], v = extent[1];
 	const struct part all = { { { -u, -v }, { u, -v }, { u, v }, { -u, v } }, 4 };
@@ -250,7 +260,17 @@ int bound_holds(struct bound_view *view, const float extent[2], double error, do
 		}
 		view->list[view->n_list++] = (uint32_t)i;
 	}
-	return outline_holds(&b, extent) && part_holds(&b, &all, 0, 0) && !view->is_failed;
+	return (is_likely || outline_holds(&b, extent)) && part_holds(&b, &all, 0, 0) && !view->is_failed;
+}
+
+int bound_holds(struct bound_view *view, const float extent[2], double error, double place[2])
+{
+	return holds(view, extent, error, place, 0);
+}
+
+int bound_likely_holds(struct bound_view *view, const float extent[2], double error)
+{
+	return holds(view, extent, error, NULL, 1);
 }
 
 double bound_least(struct bound_view *view, const struct facets *facets, const struct dpoint *point,

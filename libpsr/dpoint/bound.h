@@ -34,6 +34,9 @@ void bound_view_fini(struct bound_view *view);
  * NULL, place gets u and v of a place that is too far off, or about. */
 int bound_holds(struct bound_view *view, const float extent[2], double error, double place[2]);
 
+/* The same answer, sooner where it is 1. */
+int bound_likely_holds(struct bound_view *view, const float extent[2], double error);
+
 /* Returns a distance that bound_holds() is 1 for, and is not for half of it; or `least`. INFINITY where there are no
  * facets, or no memory. */
 double bound_least(struct bound_view *view, const struct facets *facets, const struct dpoint *point,

@@ -9,6 +9,16 @@
 
 #define SLIVER 1e-7 /* of a facet's altitude to its side: it is its sides alone */
 
+static inline double lesser(double a, double b)
+{
+	return b < a ? b : a;
+}
+
+static inline double greater(double a, double b)
+{
+	return b > a ? b : a;
+}
+
 static void prepare(struct bound_seen *seen)
 {
 	double most = 0, square;
@@ -16,10 +26,10 @@ static void prepare(struct bound_seen *seen)
 	for (int i = 0; i < 3; i++) {
 		v3d_sub(seen->side[i], seen->corner[(i + 1) % 3], seen->corner[i]);
 		square = v3d_dot(seen->side[i], seen->side[i]);
-		most = fmax(most, square);
+		most = greater(most, square);
 		seen->per_side[i] = square > 0 ? 1 / square : 0;
-		seen->low[i] = fmin(fmin(seen->corner[0][i], seen->corner[1][i]), seen->corner[2][i]);
-		seen->high[i] = fmax(fmax(seen->corner[0][i], seen->corner[1][i]), seen->corner[2][i]);
+		seen->low[i] = lesser(lesser(seen->corner[0][i], seen->corner[1][i]), seen->corner[2][i]);
+		seen->high[i] = greater(greater(seen->corner[0][i], seen->corner[1][i]), seen->corner[2][i]);
 	}
 	v3d_cross(seen->normal, seen->side[0], seen->side[1]);
 	square = v3d_dot(seen->normal, seen->normal);
@@ -35,8 +45,8 @@ void bound_rise(double w[2], const struct bound_view *view, const double low[2],
 		const double x = 0.5 * lambda[k] * low[k] * low[k], y = 0.5 * lambda[k] * high[k] * high[k];
 		const double middle = low[k] < 0 && high[k] > 0 ? 0 : x;
 
-		w[0] += fmin(fmin(x, y), middle);
-		w[1] += fmax(fmax(x, y), middle);
+		w[0] += lesser(lesser(x, y), middle);
+		w[1] += greater(greater(x, y), middle);
 	}
 }
 
@@ -118,9 +128,14 @@ void bound_view_fini(struct bound_view *view)
 
 /* ---- distances ---- */
 
+static inline double between_0_and_1(double t)
+{
+	return t > 0 ? t < 1 ? t : 1 : 0;
+}
+
 static double side_distance2(const struct bound_seen *seen, int i, const double away[3])
 {
-	const double t = fmin(fmax(v3d_dot(away, seen->side[i]) * seen->per_side[i], 0), 1);
+	const double t = between_0_and_1(v3d_dot(away, seen->side[i]) * seen->per_side[i]);
 	double left[3];
 
 	v3d_add_scaled(left, away, -t, seen->side[i]);
@@ -136,7 +151,7 @@ double bound_distance2(const struct bound_seen *seen, const double p[3])
 		v3d_sub(away, p, seen->corner[i]);
 		v3d_cross(across, seen->side[i], away);
 		if (seen->per_normal == 0 || v3d_dot(across, seen->normal) < 0)
-			least = fmin(least, side_distance2(seen, i, away));
+			least = lesser(least, side_distance2(seen, i, away));
 	}
 	if (least < INFINITY)
 		return least;

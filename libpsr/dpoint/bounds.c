@@ -7,12 +7,18 @@
 #define CHUNK 256     /* candidates */
 #define LEAST 1e-5
 #define STEPS 4       /* of halving a factor of two */
+#define SAMPLE 8      /* of so many chunks the first is measured before all */
+/* Of the worst distance that is known: points that bound_holds() is 1 for at so much come out below it. Its 0 is wrong by
+ * 3 % at most, and halving ends 1/16 above a 0: 1.03 * 1.0625 = 1.095 times as far as the point is at most. */
+#define SAFE (1 / 1.15)
 
 struct measuring {
 	const struct dpoint_surface *surface;
 	const struct dpoint_choice *choice;
 	const struct dpoint_cover_options *options;
 	struct dpoint_bounds *of_chunk;
+	double worst;  /* some chunk's: what is certainly below it is not measured */
+	int stride;    /* this turn measures each stride-th chunk; 0: the others */
 	int is_failed;
 };
 
@@ -42,17 +48,40 @@ static void look(struct dpoint_bounds *bounds, struct bound_view *view, const st
 	bounds->worst = asked > 0 && !is_over ? fmax(before, fmin(high, asked)) : high;
 }
 
-static void measure_chunk(int chunk, void *userdata)
+/* What a point is off decides nothing where it is less than another one. */
+static int is_less(struct bound_view *view, const struct measuring *m, const struct dpoint_candidate *c)
+{
+	float extent[2];
+
+	dpoint_candidate_extent(extent, c, m->options->sine);
+	return bound_look(view, &m->surface->facets, &c->point, extent, SAFE * m->worst) == PSR_OK &&
+	       bound_likely_holds(view, extent, SAFE * m->worst);
+}
+
+static int is_chunk_less(struct bound_view *view, const struct measuring *m, size_t begin, size_t end)
+{
+	if (m->options->error > 0)
+		return 0;
+	for (size_t i = begin; i < end; i++)
+		if (m->choice->is_kept[i] && !is_less(view, m, &m->surface->candidate[i]))
+			return 0;
+	return 1;
+}
+
+static void measure_chunk(int i, void *userdata)
 {
 	struct measuring *m = userdata;
+	const int chunk = m->stride > 0 ? i * m->stride : i + i / (SAMPLE - 1) + 1;
 	struct dpoint_bounds *bounds = &m->of_chunk[chunk];
 	struct bound_view view = { .seen = NULL };
 	const size_t begin = (size_t)chunk * CHUNK, n = m->surface->n_candidates;
+	const size_t end = begin + CHUNK < n ? begin + CHUNK : n;
 
 	*bounds = (struct dpoint_bounds){ 0, LEAST };
-	for (size_t i = begin; i < begin + CHUNK && i < n && !view.is_failed; i++)
-		if (m->choice->is_kept[i])
-			look(bounds, &view, m, &m->surface->candidate[i]);
+	if (m->stride > 0 || !is_chunk_less(&view, m, begin, end))
+		for (size_t c = begin; c < end && !view.is_failed; c++)
+			if (m->choice->is_kept[c])
+				look(bounds, &view, m, &m->surface->candidate[c]);
 	if (view.is_failed)
 		__atomic_store_n(&m->is_failed, 1, __ATOMIC_RELAXED);
 	bound_view_fini(&view);
@@ -62,8 +91,8 @@ int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surf
                           const struct dpoint_choice *choice, const struct dpoint_cover_options *options,
                           struct psr_pool *pool)
 {
-	const int n_chunks = (int)((surface->n_candidates + CHUNK - 1) / CHUNK);
-	struct measuring m = { .surface = surface, .choice = choice, .options = options };
+	const int n_chunks = (int)((surface->n_candidates + CHUNK - 1) / CHUNK), n_first = (n_chunks + SAMPLE - 1) / SAMPLE;
+	struct measuring m = { .surface = surface, .choice = choice, .options = options, .stride = SAMPLE };
 
 	*bounds = (struct dpoint_bounds){ 0, 0 };
 	if (surface->facets.n == 0)
@@ -71,7 +100,11 @@ int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surf
 	m.of_chunk = calloc((size_t)n_chunks + 1, sizeof *m.of_chunk);
 	if (m.of_chunk == NULL)
 		return PSR_ERR_MEMORY;
-	psr_pool_for(pool, n_chunks, measure_chunk, &m);
+	psr_pool_for(pool, n_first, measure_chunk, &m);
+	for (int i = 0; i < n_chunks; i++)
+		m.worst = fmax(m.worst, m.of_chunk[i].worst);
+	m.stride = 0;
+	psr_pool_for(pool, n_chunks - n_first, measure_chunk, &m);
 	for (int i = 0; i < n_chunks; i++) {
 		bounds->n_over += m.of_chunk[i].n_over;
 		bounds->worst = fmax(bounds->worst, m.of_chunk[i].worst);

@@ -43,12 +43,23 @@ static void select_kth(struct entry *e, long low, long high, long k, int axis)
 
 struct making {
 	struct cell_node *node;
+	struct cell_ball *ball;
 	struct entry *entry;
 	const struct dpoint_cell *cell;
 };
 
+static inline float lesser(float a, float b)
+{
+	return b < a ? b : a;
+}
+
+static inline float greater(float a, float b)
+{
+	return b > a ? b : a;
+}
+
 /* Returns the axis along which the cells reach furthest. */
-static int bound_places(struct cell_node *node, const struct making *m)
+static int bound_places(struct cell_ball *ball, const struct cell_node *node, const struct making *m)
 {
 	float low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
 	float radius2 = 0;
@@ -56,21 +67,21 @@ static int bound_places(struct cell_node *node, const struct making *m)
 
 	for (uint32_t e = node->begin; e < node->end; e++)
 		for (int k = 0; k < 3; k++) {
-			low[k] = fminf(low[k], m->entry[e].middle[k]);
-			high[k] = fmaxf(high[k], m->entry[e].middle[k]);
+			low[k] = lesser(low[k], m->entry[e].middle[k]);
+			high[k] = greater(high[k], m->entry[e].middle[k]);
 		}
 	for (int k = 0; k < 3; k++) {
-		node->middle[k] = 0.5f * (low[k] + high[k]);
+		ball->middle[k] = 0.5f * (low[k] + high[k]);
 		axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
 	}
 	for (uint32_t e = node->begin; e < node->end; e++)
 		for (int c = 0; c < 4; c++) {
 			float away[3];
 
-			v3f_sub(away, m->cell[m->entry[e].cell].corner[c], node->middle);
-			radius2 = fmaxf(radius2, v3f_dot(away, away));
+			v3f_sub(away, m->cell[m->entry[e].cell].corner[c], ball->middle);
+			radius2 = greater(radius2, v3f_dot(away, away));
 		}
-	node->radius = sqrtf(radius2) * 1.00001f;
+	ball->radius = sqrtf(radius2) * 1.00001f;
 	return axis;
 }
 
@@ -99,7 +110,7 @@ static void bound_normals(struct cell_node *node, const struct making *m)
 		v3f_sub(away, normal, node->normal);
 		if (cell->part == DPOINT_BEYOND || v3f_dot(normal, normal) == 0)
 			spread2 = INFINITY;
-		spread2 = fmaxf(spread2, v3f_dot(away, away));
+		spread2 = greater(spread2, v3f_dot(away, away));
 	}
 	node->spread = sqrtf(spread2);
 }
@@ -107,46 +118,95 @@ static void bound_normals(struct cell_node *node, const struct making *m)
 /* Above this many cells a node is nobody's as a whole, and its normals do not matter. */
 #define MOST_WHOLE 65536
 
-static void split(const struct making *m, size_t i, uint32_t begin, uint32_t end)
+static void bound(const struct making *m, size_t i, uint32_t begin, uint32_t end, int *axis)
 {
 	struct cell_node *node = &m->node[i];
-	int axis;
 
 	node->begin = begin;
 	node->end = end;
-	axis = bound_places(node, m);
+	*axis = bound_places(&m->ball[i], node, m);
 	node->spread = INFINITY;
 	if (end - begin <= MOST_WHOLE)
 		bound_normals(node, m);
-	if (end - begin > 1) {
-		const uint32_t half = begin + (end - begin) / 2;
+}
 
+static void split(const struct making *m, size_t i, uint32_t begin, uint32_t end)
+{
+	const uint32_t half = begin + (end - begin) / 2;
+	int axis;
+
+	bound(m, i, begin, end, &axis);
+	if (end - begin > 1) {
 		select_kth(m->entry, begin, (long)end - 1, half, axis);
 		split(m, 2 * i + 1, begin, half);
 		split(m, 2 * i + 2, half, end);
 	}
 }
 
-int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_t n)
-{
-	struct making m = { .cell = cell };
+/* A level of as many nodes is the threads' work. */
+#define PARTS 16
+#define FIRST_PART (PARTS - 1) /* its first node */
+#define LEAST_SHARED 4096      /* cells */
 
+static void split_part(int part, void *userdata)
+{
+	const struct making *m = userdata;
+	const size_t i = FIRST_PART + (size_t)part;
+
+	split(m, i, m->node[i].begin, m->node[i].end);
+}
+
+/* The nodes above the threads'. */
+static void split_first(const struct making *m, size_t i, uint32_t begin, uint32_t end)
+{
+	const uint32_t half = begin + (end - begin) / 2;
+	int axis;
+
+	if (i >= FIRST_PART) {
+		m->node[i].begin = begin;
+		m->node[i].end = end;
+		return;
+	}
+	bound(m, i, begin, end, &axis);
+	select_kth(m->entry, begin, (long)end - 1, half, axis);
+	split_first(m, 2 * i + 1, begin, half);
+	split_first(m, 2 * i + 2, half, end);
+}
+
+/* Balls of two children begin at a multiple of their size. */
+static int make_room(struct cell_tree *tree, size_t n)
+{
 	/* Halves of halves: a level has at most one size more than the other, so the depth is that of a full tree. */
 	for (tree->n_nodes = 1; (tree->n_nodes + 1) / 2 < n;)
 		tree->n_nodes = 2 * tree->n_nodes + 1;
 	tree->node = malloc(tree->n_nodes * sizeof *tree->node);
+	tree->balls = aligned_alloc(2 * sizeof *tree->ball, (tree->n_nodes + 1) * sizeof *tree->ball);
+	tree->ball = tree->balls != NULL ? (struct cell_ball *)tree->balls + 1 : NULL;
 	tree->order = malloc(n * sizeof *tree->order);
-	m.node = tree->node;
-	m.entry = malloc(n * sizeof *m.entry);
-	if (tree->node == NULL || tree->order == NULL || m.entry == NULL) {
+	return tree->node != NULL && tree->balls != NULL && tree->order != NULL ? PSR_OK : PSR_ERR_MEMORY;
+}
+
+int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_t n, struct psr_pool *pool)
+{
+	struct making m = { .cell = cell, .entry = malloc(n * sizeof *m.entry) };
+	int rc = make_room(tree, n);
+
+	if (rc != PSR_OK || m.entry == NULL) {
 		free(m.entry);
 		return PSR_ERR_MEMORY;
 	}
+	m.node = tree->node;
+	m.ball = tree->ball;
 	for (size_t i = 0; i < n; i++) {
 		dpoint_cell_middle(m.entry[i].middle, &cell[i]);
 		m.entry[i].cell = (uint32_t)i;
 	}
-	split(&m, 0, 0, (uint32_t)n);
+	if (n < LEAST_SHARED) {
+		split(&m, 0, 0, (uint32_t)n);
+	} else {
+		split_first(&m, 0, 0, (uint32_t)n);
+		psr_pool_for(pool, PARTS, split_part, &m);
+	}
 	for (size_t i = 0; i < n; i++)
 		tree->order[i] = m.entry[i].cell;
 	free(m.entry);
@@ -156,5 +216,6 @@ int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_
 void cell_tree_fini(struct cell_tree *tree)
 {
 	free(tree->node);
+	free(tree->balls);
 	free(tree->order);
 }

@@ -3,13 +3,18 @@
 #ifndef PSR_DPOINT_CELL_TREE_H
 #define PSR_DPOINT_CELL_TREE_H
 
+#include "base/pool.h"
 #include "look.h"
 #include "surface.h"
 
 #define CELL_NO_PART UINT32_MAX /* cells of several parts */
 
+/* A sphere that holds the corners of a node's cells: what most questions end with. */
+struct cell_ball {
+	float middle[3], radius;
+};
+
 struct cell_node {
-	float middle[3], radius;   /* of a sphere that holds the corners */
 	float normal[3], spread;   /* normals are no further from this one than `spread`; infinite: one has none, or is
 	                            * beyond */
 	uint32_t begin, end;       /* of order */
@@ -19,11 +24,14 @@ struct cell_node {
 
 struct cell_tree {
 	struct cell_node *node;
+	struct cell_ball *ball;    /* of each node; those of both children share a line of the cache */
+	void *balls;               /* what they are in */
 	uint32_t *order;
 	size_t n_nodes;            /* places for nodes; not all are there */
 };
 
-int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_t n); /* MEMORY; n > 0 */
+/* MEMORY; n > 0; pool may be NULL. */
+int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_t n, struct psr_pool *pool);
 void cell_tree_fini(struct cell_tree *tree);
 
 static inline int cell_node_is_leaf(const struct cell_node *node)

@@ -141,7 +141,7 @@ static void list_leaves(struct heap_entry *leaf, const struct cell_tree *tree, s
 	const struct cell_node *node = &tree->node[i];
 
 	if (cell_node_is_leaf(node)) {
-		leaf[node->begin] = (struct heap_entry){ node->middle[axis], (uint32_t)i };
+		leaf[node->begin] = (struct heap_entry){ tree->ball[i].middle[axis], (uint32_t)i };
 		return;
 	}
 	list_leaves(leaf, tree, 2 * i + 1, axis);

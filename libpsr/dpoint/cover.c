@@ -25,17 +25,19 @@ struct found {
 /* The covered nodes of a subtree. */
 static void search(struct found *found, const struct looking *l, const struct rectangle *r, size_t i)
 {
+	const struct cell_ball *ball = &l->tree->ball[i];
 	const struct cell_node *node = &l->tree->node[i];
-	const int is_leaf = cell_node_is_leaf(node);
 	float p[3];
+	int is_leaf;
 
-	rectangle_sees(p, r, node->middle);
-	if (!(fabsf(p[0]) <= r->extent[0] + node->radius && fabsf(p[1]) <= r->extent[1] + node->radius &&
-	      fabsf(p[2]) <= r->deep + node->radius))
+	rectangle_sees(p, r, ball->middle);
+	if (!(fabsf(p[0]) <= r->extent[0] + ball->radius && fabsf(p[1]) <= r->extent[1] + ball->radius &&
+	      fabsf(p[2]) <= r->deep + ball->radius))
 		return;
+	is_leaf = cell_node_is_leaf(node);
 	if (is_leaf && !rectangle_covers(l, r, &l->surface->cell[l->tree->order[node->begin]]))
 		return;
-	if (!is_leaf && !rectangle_covers_node(l, r, node, p)) {
+	if (!is_leaf && !rectangle_covers_node(l, r, i, p)) {
 		search(found, l, r, 2 * i + 1);
 		search(found, l, r, 2 * i + 2);
 		return;
@@ -140,7 +142,7 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
 	cover->tree = calloc(1, sizeof *cover->tree);
 	if (cover->tree == NULL)
 		return PSR_ERR_MEMORY;
-	rc = cell_tree_init(cover->tree, surface->cell, surface->n_cells);
+	rc = cell_tree_init(cover->tree, surface->cell, surface->n_cells, pool);
 	return rc == PSR_OK ? cover_candidates(cover, surface, options, &work) : rc;
 }
 

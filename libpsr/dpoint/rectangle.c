@@ -32,7 +32,8 @@ void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const s
 	r->lambda_u = c->point.lambda_u;
 	r->rho = c->point.rho;
 	r->part = c->part;
-	look_of(r->look, c->point.attr);
+	r->attr = c->point.attr;
+	look_of(r->look, r->attr);
 	dpoint_candidate_extent(r->extent, c, options->sine);
 	r->height = fminf(options->height, 0.5f * fminf(r->extent[0], r->extent[1]));
 	for (int k = 0; k < 2; k++)
@@ -84,33 +85,31 @@ int rectangle_around(float delta[2], const struct dpoint_candidate *c, const str
 	return 1;
 }
 
-void rectangle_sees(float at[3], const struct rectangle *r, const float p[3])
-{
-	float away[3];
-
-	v3f_sub(away, p, r->at);
-	m3f_apply(at, (const float (*)[3])r->axis, away);
-}
-
-int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
-                    const float at[3])
+int rectangle_suits_off(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
+                        const float at[3], float off)
 {
 	float n[3], cell_normal[3], dot;
 	struct look_range look;
 
-	if (cell->part == DPOINT_BEYOND)
+	if (cell->part == DPOINT_BEYOND || !(off <= r->height))
 		return 0;
-	look_range_of(&look, cell->attr);
-	if (look_range_distance(&look, r->look) > l->options->looks)
-		return 0;
-	if (!(fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])) <= r->height))
-		return 0;
+	if (cell->attr != r->attr) {
+		look_range_of(&look, cell->attr);
+		if (look_range_distance(&look, r->look) > l->options->looks)
+			return 0;
+	}
 	if (cell->normal[0] == 0 && cell->normal[1] == 0 && cell->normal[2] == 0)
 		return 1;
 	dpoint_normal_at(n, r->lambda_u, r->rho, at[0], at[1]);
 	m3f_apply(cell_normal, (const float (*)[3])r->axis, cell->normal);
 	dot = v3f_dot(n, cell_normal);
 	return dot > 0 && dot * dot >= l->cosine * l->cosine * v3f_dot(n, n);
+}
+
+int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
+                    const float at[3])
+{
+	return rectangle_suits_off(l, r, cell, at, fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])));
 }
 
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell)
@@ -129,28 +128,33 @@ int rectangle_covers(const struct looking *l, const struct rectangle *r, const s
 }
 
 /* Within the sphere S_p's normal turns by 1.6 radius |lambda_u| at most, as long as the sine of its angle is below
- * MOST_SINE, and heights part by the tangent of the normals' difference. */
-int rectangle_suits_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
-                         const float p[3])
+ * MOST_SINE, and heights part by the tangent of the normals' difference. What these alone are too much for is told
+ * first: rounded sums and products grow with each of their terms. */
+int rectangle_suits_node(const struct looking *l, const struct rectangle *r, size_t i, const float p[3])
 {
-	const float away = fmaxf(fabsf(p[0]), fabsf(p[1])) + node->radius;
-	float n[3], normal[3], chord;
+	const struct cell_node *node = &l->tree->node[i];
+	const float radius = l->tree->ball[i].radius, turn = 1.6f * radius * fabsf(r->lambda_u);
+	const float u = fabsf(p[0]), v = fabsf(p[1]), away = (u > v ? u : v) + radius;
+	float n[3], normal[3], off, chord = node->spread + turn;
 
-	if (node->spread >= MOST_CHORD || !(away * fabsf(r->lambda_u) <= MOST_SINE) ||
-	    look_range_distance(&node->looks, r->look) > l->options->looks)
+	if (node->spread >= MOST_CHORD || !(away * fabsf(r->lambda_u) <= MOST_SINE) || chord > l->chord ||
+	    1.2f * chord * radius > r->height)
+		return 0;
+	off = fabsf(p[2] - dpoint_height_at(r->lambda_u, r->rho, p[0], p[1]));
+	if (off + 1.2f * chord * radius > r->height || look_range_distance(&node->looks, r->look) > l->options->looks)
 		return 0;
 	dpoint_normal_at(n, r->lambda_u, r->rho, p[0], p[1]);
 	v3f_normalize(n, n);
 	m3f_apply(normal, (const float (*)[3])r->axis, node->normal);
 	v3f_sub(n, n, normal);
-	chord = v3f_length(n) + node->spread + 1.6f * node->radius * fabsf(r->lambda_u);
-	return chord <= l->chord && fabsf(p[2] - dpoint_height_at(r->lambda_u, r->rho, p[0], p[1])) +
-	                            1.2f * chord * node->radius <= r->height;
+	chord = v3f_length(n) + node->spread + turn;
+	return chord <= l->chord && off + 1.2f * chord * radius <= r->height;
 }
 
-int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
-                          const float p[3])
+int rectangle_covers_node(const struct looking *l, const struct rectangle *r, size_t i, const float p[3])
 {
-	return fabsf(p[0]) + node->radius <= r->extent[0] && fabsf(p[1]) + node->radius <= r->extent[1] &&
-	       !(l->options->is_within_parts && node->part != r->part) && rectangle_suits_node(l, r, node, p);
+	const float radius = l->tree->ball[i].radius;
+
+	return fabsf(p[0]) + radius <= r->extent[0] && fabsf(p[1]) + radius <= r->extent[1] &&
+	       !(l->options->is_within_parts && l->tree->node[i].part != r->part) && rectangle_suits_node(l, r, i, p);
 }

@@ -2,6 +2,7 @@
 #ifndef PSR_DPOINT_RECTANGLE_H
 #define PSR_DPOINT_RECTANGLE_H
 
+#include "base/vec.h"
 #include "cell_tree.h"
 
 struct looking {
@@ -20,7 +21,8 @@ struct rectangle {
 	float height;            /* how far from S_p */
 	float lambda_u, rho;
 	uint32_t part;
-	uint8_t look[LOOK_CHANNELS];
+	uint64_t attr;
+	uint8_t look[LOOK_CHANNELS]; /* that of attr */
 };
 
 void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options);
@@ -34,22 +36,30 @@ int rectangle_around(float delta[2], const struct dpoint_candidate *c, const str
                      const struct dpoint_cover_options *options);
 
 /* A place in the frame of the rectangle. */
-void rectangle_sees(float at[3], const struct rectangle *r, const float p[3]);
+static inline void rectangle_sees(float at[3], const struct rectangle *r, const float p[3])
+{
+	float away[3];
+
+	v3f_sub(away, p, r->at);
+	m3f_apply(at, (const float (*)[3])r->axis, away);
+}
 
 /* Whether in the cell's middle, `at` in the rectangle's frame, height and normal are S_p's, and
  * its look is the point's, as the options say. */
 int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
                     const float at[3]);
 
+/* The same, where it is known how far from S_p the middle is. */
+int rectangle_suits_off(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
+                        const float at[3], float off);
+
 /* Whether all corners are within the extents, and the cell suits. */
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell);
 
 /* Whether all cells of a node suit, or are covered, told by its sphere, at p in the rectangle's frame, and by its
  * normals and looks alone: 0 may be wrong. */
-int rectangle_suits_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
-                         const float p[3]);
-int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
-                          const float p[3]);
+int rectangle_suits_node(const struct looking *l, const struct rectangle *r, size_t node, const float p[3]);
+int rectangle_covers_node(const struct looking *l, const struct rectangle *r, size_t node, const float p[3]);
 
 /* ---- steps of dpoint_simplify() ---- */
 

@@ -72,11 +72,12 @@ struct nearby {
 
 static void gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius)
 {
+	const struct cell_ball *ball = &s->tree.ball[i];
 	const struct cell_node *node = &s->tree.node[i];
 	float away[3];
 
-	v3f_sub(away, node->middle, middle);
-	if (v3f_dot(away, away) > (node->radius + radius) * (node->radius + radius))
+	v3f_sub(away, ball->middle, middle);
+	if (v3f_dot(away, away) > (ball->radius + radius) * (ball->radius + radius))
 		return;
 	if (!cell_node_is_leaf(node)) {
 		gather(nearby, s, 2 * i + 1, middle, radius);
@@ -218,35 +219,46 @@ static void put_first(struct nearby *nearby, const float at[3])
 	}
 }
 
-static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
+/* Whether these lids stop all rays to the cell, from both sides if it has two. */
+static int stops_rays(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
+                      const float (*from)[DIRECTIONS][3], const float middle[3])
 {
-	const struct dpoint_cell *cell = &s->surface->cell[at];
-	float from[DIRECTIONS][3], middle[3], radius = 0, away[3];
-
-	if (cell->part == DPOINT_BEYOND || !directions(from, s, cell))
-		return 1;
-	dpoint_cell_middle(middle, cell);
-	for (int c = 0; c < 4; c++) {
-		v3f_sub(away, cell->corner[c], middle);
-		radius = fmaxf(radius, v3f_length(away));
-	}
-	nearby->n = 0;
-	gather(nearby, s, 0, middle, radius + 2 * s->behind);
-	put_first(nearby, middle);
-	for (int side = 0; side < 1 + is_two_sided(s->options, cell->part); side++) {
+	for (int side = 0; side < 1 + is_two_sided(s->options, cell->part); side++)
 		for (int p = 0; p < PLACES; p++) {
 			const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
 			float place[3];
 
 			for (int k = 0; k < 3; k++)
 				place[k] = p == 8 ? middle[k] : middle[k] + INWARDS * (0.5f * (corner[k] + next[k]) - middle[k]);
-			if (!is_sealed_at(s, nearby, place, (const float (*)[3])from, from[0]))
+			if (!is_sealed_at(s, nearby, place, from[side], from[side][0]))
 				return 0;
 		}
-		for (int d = 0; d < DIRECTIONS; d++)
-			v3f_scale(from[d], from[d], -1);
-	}
 	return 1;
+}
+
+/* Those that are over the cell stop most: others are asked only where these do not. */
+static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
+{
+	const struct dpoint_cell *cell = &s->surface->cell[at];
+	float from[2][DIRECTIONS][3], middle[3], radius = 0, away[3];
+
+	if (cell->part == DPOINT_BEYOND || !directions(from[0], s, cell))
+		return 1;
+	for (int d = 0; d < DIRECTIONS; d++)
+		v3f_scale(from[1][d], from[0][d], -1);
+	dpoint_cell_middle(middle, cell);
+	for (int c = 0; c < 4; c++) {
+		v3f_sub(away, cell->corner[c], middle);
+		radius = fmaxf(radius, v3f_length(away));
+	}
+	for (int is_all = 0; is_all < 2; is_all++) {
+		nearby->n = 0;
+		gather(nearby, s, 0, middle, radius + (is_all ? 2 * s->behind : 0));
+		put_first(nearby, middle);
+		if (stops_rays(s, nearby, cell, (const float (*)[DIRECTIONS][3])from, middle))
+			return 1;
+	}
+	return 0;
 }
 
 static void look(int chunk, void *userdata)
@@ -266,7 +278,7 @@ static void look(int chunk, void *userdata)
 
 /* ---- all cells ---- */
 
-static int make_lids(struct sealing *s, const struct dpoint_choice *choice)
+static int make_lids(struct sealing *s, const struct dpoint_choice *choice, struct psr_pool *pool)
 {
 	struct dpoint_cell *cell = malloc((choice->n_kept + 1) * sizeof *cell);
 	size_t n = 0;
@@ -282,7 +294,7 @@ static int make_lids(struct sealing *s, const struct dpoint_choice *choice)
 			lid_make(&s->lid[n], &cell[n], &s->surface->candidate[i], s->options);
 			n++;
 		}
-	rc = cell_tree_init(&s->tree, cell, n);
+	rc = cell_tree_init(&s->tree, cell, n, pool);
 	free(cell);
 	return rc;
 }
@@ -349,7 +361,7 @@ static int keep_more(struct sealing *s, struct dpoint_choice *choice, const stru
 
 static int look_all(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_work *work)
 {
-	int rc = make_lids(s, choice);
+	int rc = make_lids(s, choice, work->pool);
 
 	if (rc == PSR_OK)
 		rc = psr_pool_for_until(work->pool, work->cancel, (int)((s->surface->n_cells + CHUNK - 1) / CHUNK), look, s);

@@ -1,0 +1,92 @@
+#include "backing.h"
+
+#include <math.h>
+
+/* Whether a convex quadrilateral holds the place u, v. */
+static int is_in(const float corner[4][3], float u, float v)
+{
+	int n_left = 0, n_right = 0;
+
+	for (int c = 0; c < 4; c++) {
+		const float *a = corner[c], *b = corner[(c + 1) % 4];
+		const float side = (b[0] - a[0]) * (v - a[1]) - (b[1] - a[1]) * (u - a[0]);
+
+		n_left += side >= 0;
+		n_right += side <= 0;
+	}
+	return n_left == 4 || n_right == 4;
+}
+
+/* A place of S_p. */
+struct standing {
+	const struct looking *l;
+	const struct rectangle *r;
+	float at[3];
+};
+
+static int may_back(const struct standing *s, size_t i)
+{
+	const struct cell_ball *ball = &s->l->tree->ball[i];
+	float p[3];
+
+	rectangle_sees(p, s->r, ball->middle);
+	return fabsf(p[0] - s->at[0]) <= ball->radius && fabsf(p[1] - s->at[1]) <= ball->radius &&
+	       fabsf(p[2] - s->at[2]) <= ball->radius + 2 * s->r->height;
+}
+
+static int leaf_backs(const struct standing *s, size_t i)
+{
+	const struct looking *l = s->l;
+	const struct dpoint_cell *cell = &l->surface->cell[l->tree->order[l->tree->node[i].begin]];
+	float corner[4][3], middle[3] = { 0, 0, 0 };
+
+	for (int c = 0; c < 4; c++) {
+		rectangle_sees(corner[c], s->r, cell->corner[c]);
+		v3f_add_scaled(middle, middle, 0.25f, corner[c]);
+	}
+	return is_in((const float (*)[3])corner, s->at[0], s->at[1]) && rectangle_suits(l, s->r, cell, middle);
+}
+
+/* Returns the leaf of a cell that backs the place, of those below a node that may; or 0. */
+static size_t backing_below(const struct standing *s, size_t i)
+{
+	size_t found = 0;
+
+	if (cell_node_is_leaf(&s->l->tree->node[i]))
+		return leaf_backs(s, i) ? i : 0;
+	for (size_t child = 2 * i + 1; child <= 2 * i + 2 && found == 0; child++)
+		if (may_back(s, child))
+			found = backing_below(s, child);
+	return found;
+}
+
+/* The same of the whole tree, first near the leaf that was found last. A leaf counts where all nodes above it may back the place, in whatever order they are asked. */
+static size_t find_backing(const struct standing *s, size_t last)
+{
+	size_t way[64], n = 0, deepest = 0, found = 0;
+
+	for (size_t i = last; i > 0; i = (i - 1) / 2)
+		way[n++] = i;
+	if (!may_back(s, 0))
+		return 0;
+	while (n > 0 && may_back(s, way[n - 1]))
+		deepest = way[--n];
+	found = backing_below(s, deepest);
+	for (size_t i = deepest; i > 0 && found == 0; i = (i - 1) / 2) {
+		const size_t other = i % 2 == 1 ? i + 1 : i - 1;
+
+		if (may_back(s, other))
+			found = backing_below(s, other);
+	}
+	return found;
+}
+
+int is_backed(size_t *last, const struct looking *l, const struct rectangle *r, float u, float v)
+{
+	const struct standing s = { l, r, { u, v, dpoint_height_at(r->lambda_u, r->rho, u, v) } };
+	const size_t found = find_backing(&s, *last);
+
+	if (found > 0)
+		*last = found;
+	return found > 0;
+}
