@@ -28,7 +28,7 @@ float cull_place_error(const struct plan *plan, const struct plan_instance *in, 
 	if (plan->with_ewa && in->cull.cubes != NULL)
 		drawn = EWA_REACH * apart + EWA_REACH_PIXELS;
 	else if (plan->with_splats)
-		drawn = SPLAT_RADIUS * apart > half ? SPLAT_RADIUS * apart : half;
+		drawn = DISC_RADIUS * apart > half ? DISC_RADIUS * apart : half;
 	else if (traits & PSR_BLOCK_THIN && apart >= 2)
 		drawn = half * (apart + 1);
 	return drawn + (float)PSR_SAMPLE_OFF * apart + depth_error;

@@ -277,7 +277,7 @@ static void draw_glass(struct sheer_tile *l, struct sheer_drawing *d, const stru
 	l->list.n_words = l->n_words + first;
 	l->list.n = 0;
 	l->list.failed = 0; /* of an earlier picture */
-	sheer_list_blocks(&l->list, d->plan, d->bins->entry + glass->begin, glass->end - glass->begin, target);
+	sheer_list_blocks(&l->list, d->simd, d->plan, d->bins->entry + glass->begin, glass->end - glass->begin, target);
 	if (l->list.failed) {
 		atomic_store(&d->failed, 1);
 		return;

@@ -67,8 +67,8 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 
 /* Lists the words of blocks in a tile. Samples at most a pixel apart are pixels if the picture has no splats; all
  * others are discs. */
-void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
-                       const struct warp_target *target);
+void sheer_list_blocks(struct sheer_list *list, const struct simd *simd, const struct plan *plan,
+                       const struct bin_entry *entry, uint32_t n, const struct warp_target *target);
 
 /* The picture to draw over: sRGB or NULL, 16 bits a channel if the plan is wide, depths in world units, and the frame if
  * it has other planes, or NULL. */

@@ -115,12 +115,12 @@ static void list_points(const struct plan *plan, const struct bin_entry *entry, 
 	}
 }
 
-void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
-                       const struct warp_target *target)
+void sheer_list_blocks(struct sheer_list *list, const struct simd *simd, const struct plan *plan,
+                       const struct bin_entry *entry, uint32_t n, const struct warp_target *target)
 {
 	for (uint32_t e = 0; e < n && !plan_is_cancelled(plan); e++)
 		if (entry[e].level || plan->with_splats)
-			splat_list(plan, &entry[e], target, list);
+			splat_list(simd, plan, &entry[e], target, list);
 		else
 			list_points(plan, &entry[e], target, list);
 }

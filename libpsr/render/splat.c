@@ -1,179 +1,154 @@
-#include <math.h>
 #include <string.h>
 #include "base/maths.h"
 #include "base/vec.h"
-#include "base/direction.h"
-#include "block.h"
 #include "splat.h"
+#include "splat_cut.h"
 #include "splat_disc.h"
-#include "simd/block.h"
 
-/* The greatest slope of a tangent plane in its projection, where a sample lacks neighbours. Projections own surfaces
- * that they see at less than 50 degrees; steeper normals mostly belong to a texture or to detail smaller than the disc.
- * Measured. */
-#define MOST_SLOPE 0.7f
-/* The greatest slope of a plane that neighbours confirm. */
-#define MOST_STEEP 3.0f
-/* Share of the radius along a line without neighbours on either side: the surface is narrower than a step there. */
-#define NARROW 0.5f
-/* Levels from which a block's discs cover so many pixels that each disc asks whether the frame is to end. */
+/* The levels from which a block's discs cover so many pixels that each disc asks whether the frame is to end. */
 #define LONG_LISTED 2
+#define LONG_DRAWN 4
 /* The finest level whose discs are cut: of finer ones, what is cut off is a pixel, and so are the seams. Measured. */
 #define LEAST_CUT 2
+/* Offcuts reach so many radii: a crack between two cut discs may be a little wider than what was cut off. Measured. */
+#define OFFCUT_REACH 1.25f
 
-/* Depths of a block's samples by place in the lattice. */
-struct lattice_depths {
-	uint64_t mask;
-	uint16_t depth[PSR_BLOCK_SAMPLES];
-	float rise; /* a step of depth, in steps of the lattice */
+/* Where a picture's discs go. */
+enum way { WORDS, LIST, VEILS };
+
+/* A disc that is drawn pixel by pixel. */
+struct splat {
+	float at[3], radius[2][3], rim;
+	uint32_t id, veil;
+	int is_cut;
+	struct splat_cut cut;
 };
 
-static void place_depths(struct lattice_depths *to, const struct warp_block *b, float rise)
+static inline void lower(const struct warp_target *t, int32_t x, int32_t y, float z, uint32_t id)
 {
-	const uint16_t *depth = b->depth;
+	const uint64_t word = (uint64_t)psr_bits_from_float(z) << 32 | id;
+	uint64_t *at = &t->word[(size_t)(y - t->y0) * t->stride + (size_t)(x - t->x0)];
 
-	to->mask = b->mask;
-	to->rise = rise;
-	for (uint64_t left = b->mask; left; left &= left - 1)
-		to->depth[__builtin_ctzll(left)] = *depth++;
+	*at = word < *at ? word : *at;
 }
 
-/* Finds the slope towards a neighbour. Returns 0 if the block has no sample there. */
-static inline int slope_to(float *slope, const struct lattice_depths *at, int own, int row, int col)
+/* NaN gives high. */
+static inline int32_t within(float x, int32_t low, int32_t high)
 {
-	if (((row | col) & ~7) != 0 || !(at->mask >> (8 * row + col) & 1))
-		return 0;
-	*slope = (float)((int)at->depth[8 * row + col] - own) * at->rise;
-	return 1;
+	return x <= (float)low ? low : x < (float)high ? (int32_t)x : high;
 }
 
-/* Slope along a line of the lattice: the normal's, clamped between the slopes to the neighbours on both sides. `safe`
- * unless the sample has both. */
-static inline float slope_along(int has_next, float next, int has_last, float last, float normal, float safe)
+/* Lists a pixel of a disc unless an opaque surface is nearer than its plane by half of a rim's depth: a sheer surface
+ * on an opaque one stays visible. */
+static inline void list_place(struct sheer_list *list, const struct splat *s, uint32_t at, float z, float square)
 {
-	const float low = next < -last ? next : -last, high = next < -last ? -last : next;
-
-	if (!(has_next && has_last))
-		return safe;
-	return normal > low ? normal < high ? normal : high : low;
+	if (z - (square + 0.5f) * s->rim < list->before[at])
+		sheer_add(list, at, (uint64_t)psr_bits_from_float(z) << 32 | s->id);
 }
 
-/* Finds how the projection's z rises along its x and y, on the plane of a normal. */
-static void slope_of_normal(float slope[2], const float n[3], const struct psr_projection *projection)
+/* Draws a pixel of a cut disc, or marks one of its offcut. */
+static inline void draw_cut(const struct splat_target *t, const struct splat *s, const int32_t at[2],
+                            const float place[2], float z)
 {
-	const float nz = v3f_dot(n, projection->axis[2]);
+	const int32_t x = at[0], y = at[1];
 
-	slope[0] = -v3f_dot(n, projection->axis[0]) / nz;
-	slope[1] = -v3f_dot(n, projection->axis[1]) / nz;
+	if (splat_is_cut_off(&s->cut, place))
+		t->offcuts->bits[(size_t)y * t->offcuts->stride + (size_t)x / 8] |= (uint8_t)(1 << x % 8);
+	else if (place[0] * place[0] + place[1] * place[1] <= 1)
+		lower(t->tile, x, y, z, s->id);
 }
 
-static void limit_slope(float slope[2], float most)
+/* Draws the pixels whose centres are in the ellipse: what discs_draw() does, for other ways, and for cut discs. */
+static inline __attribute__((always_inline)) void draw_splat(const struct splat_target *t, const struct splat *s,
+                                                             enum way way)
 {
-	const float length = __builtin_sqrtf(slope[0] * slope[0] + slope[1] * slope[1]);
+	const struct warp_target *tile = t->tile;
+	const float u = s->at[0], v = s->at[1], *a = s->radius[0], *b = s->radius[1], reach = s->is_cut ? OFFCUT_REACH : 1;
+	const float extent_x = reach * (__builtin_fabsf(a[0]) + __builtin_fabsf(b[0])),
+				extent_y = reach * (__builtin_fabsf(a[1]) + __builtin_fabsf(b[1]));
+	const float area = a[0] * b[1] - a[1] * b[0];
 
-	if (!(length <= most)) {
-		const int is_vertical = !(length < 0x1p60f);
+	if (!(area < 0 || area > 0))
+		return;
+	const float p_x = b[1] / area, p_y = -b[0] / area, q_x = -a[1] / area, q_y = a[0] / area;
+	const int32_t x0 = within(u - extent_x, tile->x0, tile->x1), x1 = within(u + extent_x + 1, tile->x0, tile->x1);
+	const int32_t y0 = within(v - extent_y, tile->y0, tile->y1), y1 = within(v + extent_y + 1, tile->y0, tile->y1);
+	for (int32_t y = y0; y < y1; y++)
+		for (int32_t x = x0; x < x1; x++) {
+			const uint32_t at = (uint32_t)(y - tile->y0) * tile->stride + (uint32_t)(x - tile->x0);
+			const float dx = (float)x + 0.5f - u, dy = (float)y + 0.5f - v;
+			const float p = dx * p_x + dy * p_y, q = dx * q_x + dy * q_y, square = p * p + q * q;
+			const float z = (s->at[2] + (p * a[2] + q * b[2])) + square * s->rim;
 
-		slope[0] = is_vertical ? 0 : slope[0] * (most / length);
-		slope[1] = is_vertical ? 0 : slope[1] * (most / length);
+			if (!(square <= reach * reach && z > t->plan->near_z))
+				continue;
+			if (way == LIST)
+				list_place(t->list, s, at, z, square);
+			else if (way == VEILS)
+				veil_add(t->veils, at, (uint64_t)psr_bits_from_float(z) << 32 | s->id, s->veil);
+			else
+				draw_cut(t, s, (const int32_t[2]){ x, y }, (const float[2]){ p, q }, z);
+		}
+}
+
+void splat_words(const struct splat_target *t, const struct discs *discs, uint64_t mask, unsigned level)
+{
+	if (level < LONG_DRAWN)
+		t->simd->discs_draw(t->tile, discs, mask);
+	for (uint64_t left = level < LONG_DRAWN ? 0 : mask; left && !plan_is_cancelled(t->plan); left &= left - 1)
+		t->simd->discs_draw(t->tile, discs, left & -left);
+}
+
+/* Draws the discs of the lanes of `mask` one by one; ends: those of cut ones. */
+static inline __attribute__((always_inline)) void draw_each(const struct splat_target *t, const struct discs *discs,
+                                                            uint64_t mask, const struct bin_entry *entry,
+                                                            const struct splat_ends *ends, enum way way)
+{
+	const struct warp_instance *in = &t->plan->warp[entry->instance];
+	const struct psr_blocks *blocks = in->blocks;
+	const uint32_t block = entry->slot - in->first_slot, first = psr_blocks_attr_first(blocks, block);
+	struct splat s = { .rim = discs->rim, .is_cut = way == WORDS };
+
+	for (uint64_t left = mask; left; left &= left - 1) {
+		const uint32_t i = (uint32_t)__builtin_ctzll(left);
+
+		if (entry->level >= (way == LIST ? LONG_LISTED : LONG_DRAWN) && plan_is_cancelled(t->plan))
+			return;
+		for (int a = 0; a < 3; a++) {
+			s.at[a] = discs->at[a][i];
+			for (int k = 0; k < 2; k++)
+				s.radius[k][a] = discs->radius[k][a][i];
+		}
+		s.id = discs->id + i;
+		if (way == WORDS)
+			splat_cut_make(&s.cut, ends, i,
+			               (const float[2]){ discs->share[0][i] * DISC_RADIUS, discs->share[1][i] * DISC_RADIUS });
+		if (way == VEILS) {
+			const uint64_t below = blocks->mask[block] & ((UINT64_C(1) << i) - 1);
+
+			s.veil = (uint32_t)(t->veils->bits[blocks->opacity[first + (uint32_t)__builtin_popcountll(below)]] * t->area);
+		}
+		draw_splat(t, &s, way);
 	}
-}
-
-/* Finds the slopes of a disc's plane, and the share of its radius along the rows and across them. The plane is the
- * normal's, clamped along each of the lattice's three lines by the depths on both sides: the normal may come from a
- * map, or a rounded corner. Odd rows are half a step to the right. */
-static void find_plane(float slope[2], float share[2], const struct lattice_depths *at, uint32_t sample,
-                       const float n[3], const struct psr_projection *projection)
-{
-	static const float half = 0.5f, high = 0.866025404f;
-	const int r = (int)(sample >> 3), c = (int)(sample & 7), own = at->depth[sample], left = c - 1 + (r & 1);
-	float normal[2], next[3] = { 0, 0, 0 }, last[3] = { 0, 0, 0 }, rise[3];
-
-	slope_of_normal(normal, n, projection);
-	const int has_next[3] = { slope_to(&next[0], at, own, r, c + 1), slope_to(&next[1], at, own, r + 1, left + 1),
-		                      slope_to(&next[2], at, own, r + 1, left) };
-	const int has_last[3] = { slope_to(&last[0], at, own, r, c - 1), slope_to(&last[1], at, own, r - 1, left),
-		                      slope_to(&last[2], at, own, r - 1, left + 1) };
-	const float along[3] = { normal[0], normal[0] * half + normal[1] * high, normal[1] * high - normal[0] * half };
-	limit_slope(normal, MOST_SLOPE);
-	const float safe[3] = { normal[0], normal[0] * half + normal[1] * high, normal[1] * high - normal[0] * half };
-	for (int i = 0; i < 3; i++)
-		rise[i] = slope_along(has_next[i], next[i], has_last[i], last[i], along[i], safe[i]);
-	slope[0] = (2 * rise[0] + rise[1] - rise[2]) / 3;
-	slope[1] = (rise[1] + rise[2]) / (2 * high);
-	limit_slope(slope, MOST_STEEP);
-	/* A sample at the block's border may have neighbours in the next block. */
-	const int beside = has_next[0] | has_last[0] | (c == 0) | (c == 7);
-	const int at_end = (r == 0) | (r == 7) | (left < 0) | (left == 7);
-	const int across = has_next[1] | has_next[2] | has_last[1] | has_last[2] | at_end;
-	share[0] = beside ? 1 : NARROW;
-	share[1] = across ? 1 : NARROW;
 }
 
 static inline __attribute__((always_inline)) void draw_block(const struct splat_target *t,
                                                              const struct bin_entry *entry, enum way way)
 {
 	const struct warp_instance *in = &t->plan->warp[entry->instance];
-	const struct psr_projection *projection =
-		&in->blocks->projection[in->blocks->block_projection[entry->slot - in->first_slot]];
-	const float (*normals)[3] = psr_direction_table();
-	const int perspective = t->plan->perspective;
-	struct lattice_depths at;
+	const uint32_t block = entry->slot - in->first_slot;
+	const int may_cut = way == WORDS && entry->level >= LEAST_CUT && entry->level < t->cut_below;
 	struct splat_ends ends;
-	struct warp_block b;
-	struct splat s;
+	struct discs discs;
 
-	warp_block_make(&b, in, entry->slot);
-	splat_find_ends(&ends, way == WORDS && entry->level >= LEAST_CUT && entry->level < t->cut_below ? b.mask : 0);
-	const float scale = (float)b.scale, step = projection->spacing * scale;
-	/* Radii in the projection's plane, along x and y, and along z for a slope of 1. */
-	float radius[2][3], along[3];
-	for (int a = 0; a < 3; a++) {
-		radius[0][a] = SPLAT_RADIUS * scale * (float)b.lattice->step[a];
-		radius[1][a] = SPLAT_RADIUS * scale * (float)b.lattice->down[a] / 0.866025404f;
-		along[a] = SPLAT_RADIUS * step * (float)b.lattice->along[a];
-	}
-	place_depths(&at, &b, b.rise / (projection->spacing * (float)b.scale));
-	s = (struct splat){ .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale,
-		                .most = (float)((1 << entry->level) + 2) };
-	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
-		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
-		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
-		float p[3], d[3], slope[2], share[2];
-
-		s.is_cut = way == WORDS && (ends.any >> sample & 1);
-		for (int a = 0; a < 3; a++)
-			p[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c])
-			       + depth * b.unit[a];
-		if (!(p[2] > t->plan->near_z))
-			continue;
-		const float inverse = perspective ? 1 / p[2] : 1;
-		v3f_set(s.at, p[0] * inverse, p[1] * inverse, p[2]);
-		for (int k = 0; k < 3; k++)
-			d[k] = (s.at[0] * in->du[k] + s.at[1] * in->dv[k]) + in->d0[k];
-		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
-			continue;
-		if (entry->level >= (way == LIST ? LONG_LISTED : LONG_DRAWN) && plan_is_cancelled(t->plan))
-			return;
-		find_plane(slope, share, &at, sample, n, projection);
-		for (int i = 0; i < 2; i++) {
-			float h[3];
-
-			for (int a = 0; a < 3; a++)
-				h[a] = share[i] * (radius[i][a] + slope[i] * along[a]);
-			s.radius[i][0] = perspective ? (h[0] - s.at[0] * h[2]) * inverse : h[0];
-			s.radius[i][1] = perspective ? (h[1] - s.at[1] * h[2]) * inverse : h[1];
-			s.radius[i][2] = h[2];
-		}
-		if (s.is_cut)
-			splat_cut_make(&s.cut, &ends, sample,
-			               (const float[2]){ share[0] * SPLAT_RADIUS, share[1] * SPLAT_RADIUS });
-		s.id = b.id + sample;
-		if (way == VEILS)
-			s.veil = (uint32_t)(t->veils->bits[in->blocks->opacity[b.attr - in->blocks->attr]] * t->area);
-		limit_reach(&s);
-		draw_splat(t, &s, way);
-	}
+	splat_find_ends(&ends, may_cut ? in->blocks->mask[block] : 0);
+	t->simd->discs_of_block(&discs, t->tile, entry);
+	discs.most = (float)((1 << entry->level) + 2);
+	discs.rim = splat_rim(&t->plan->instance[entry->instance], block);
+	t->simd->discs_place(&discs, t->tile);
+	if (way == WORDS)
+		splat_words(t, &discs, discs.mask & ~ends.any, entry->level);
+	draw_each(t, &discs, way == WORDS ? discs.mask & ends.any : discs.mask, entry, &ends, way);
 }
 
 /* Draws the samples' cells by the warp, which draws words, too. Blocks of level 0 get cells of two pixels. */
@@ -198,12 +173,12 @@ static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, con
 	return n_inside;
 }
 
-static void clear_offcuts(const struct splat_target *t)
+static void clear_offcuts(const struct splat_offcuts *offcuts, const struct warp_target *t)
 {
 	const size_t n_bytes = ((size_t)(t->x1 - t->x0) + 7) / 8;
 
 	for (int32_t y = t->y0; y < t->y1; y++)
-		memset(t->offcuts->bits + (size_t)y * t->offcuts->stride + t->x0 / 8, 0, n_bytes);
+		memset(offcuts->bits + (size_t)y * offcuts->stride + t->x0 / 8, 0, n_bytes);
 }
 
 _Static_assert(TILE_WIDTH % 8 == 0, "a byte of offcuts is in one tile");
@@ -220,10 +195,9 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	counts.n_inside = draw_cells(simd, plan, &target, into->stack->levels, bins->entry + begin, end - begin);
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
-	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
-		                            target.x1, target.y1,   NULL,          NULL,      0,
-		                            &into->offcuts, into->cut_below };
-	clear_offcuts(&t);
+	const struct splat_target t = { .simd = simd, .plan = plan, .tile = &target, .offcuts = &into->offcuts,
+		                            .cut_below = into->cut_below };
+	clear_offcuts(&into->offcuts, &target);
 	for (uint32_t e = begin; e < end && !(e % 8 == 0 && plan_is_cancelled(plan)); e++) {
 		if (plan->warp[bins->entry[e].instance].cubes != NULL)
 			splat_cube(&t, &bins->entry[e]);
@@ -235,20 +209,18 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	return counts;
 }
 
-void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                struct sheer_list *list)
+void splat_list(const struct simd *simd, const struct plan *plan, const struct bin_entry *entry,
+                const struct warp_target *target, struct sheer_list *list)
 {
-	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, list,       NULL,           0, NULL, 0 };
+	const struct splat_target t = { .simd = simd, .plan = plan, .tile = target, .list = list };
 
 	draw_block(&t, entry, LIST);
 }
 
-void splat_veil(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                const struct veil_layer *layer, float area)
+void splat_veil(const struct simd *simd, const struct plan *plan, const struct bin_entry *entry,
+                const struct warp_target *target, const struct veil_layer *layer, float area)
 {
-	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, NULL,           layer, area, NULL, 0 };
+	const struct splat_target t = { .simd = simd, .plan = plan, .tile = target, .veils = layer, .area = area };
 
 	draw_block(&t, entry, VEILS);
 }

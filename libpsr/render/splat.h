@@ -4,9 +4,7 @@
 
 #include "gaps.h"
 #include "warp.h"
-
-/* Of a disc, in steps of the lattice: no point of an equilateral lattice is further than 1/sqrt(3) from a sample. */
-#define SPLAT_RADIUS 0.6f
+#include "simd/discs.h"
 
 /* Pixels where something was cut off a disc: a bit a pixel, the lowest first. */
 struct splat_offcuts {
@@ -31,13 +29,13 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 
 /* Lists the discs of a block inside the tile. */
 struct sheer_list;
-void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                struct sheer_list *list);
+void splat_list(const struct simd *simd, const struct plan *plan, const struct bin_entry *entry,
+                const struct warp_target *target, struct sheer_list *list);
 
 /* Adds the veils of the discs of a block inside the tile, each `area` times its opacity's. */
 struct veil_layer;
-void splat_veil(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                const struct veil_layer *layer, float area);
+void splat_veil(const struct simd *simd, const struct plan *plan, const struct bin_entry *entry,
+                const struct warp_target *target, const struct veil_layer *layer, float area);
 
 /* Returns the depth in z' added at the rims of a block's discs: a step of its lattice. */
 float splat_rim(const struct plan_instance *in, uint32_t block);

@@ -1,5 +1,8 @@
 /* Leaves of octrees as discs. */
+#include <stddef.h>
+#include <string.h>
 #include "base/direction.h"
+#include "base/vec.h"
 #include "block.h"
 #include "splat_disc.h"
 #include "simd/cube.h"
@@ -22,18 +25,19 @@ static void find_tangents(float tangent[2][3], const float n[3])
 }
 
 /* Finds the radii of a disc in the picture. */
-static void project_disc(struct splat *s, const float tangent[2][3], const float axis[3][3], int perspective)
+static void project_disc(struct discs *d, uint32_t lane, const float tangent[2][3], const float axis[3][3],
+                         int perspective)
 {
-	const float inverse = perspective ? 1 / s->at[2] : 1;
+	const float u = d->at[0][lane], v = d->at[1][lane], inverse = perspective ? 1 / d->at[2][lane] : 1;
 
 	for (int i = 0; i < 2; i++) {
 		float h[3];
 
 		for (int a = 0; a < 3; a++)
 			h[a] = v3f_dot(axis[a], tangent[i]);
-		s->radius[i][0] = perspective ? (h[0] - s->at[0] * h[2]) * inverse : h[0];
-		s->radius[i][1] = perspective ? (h[1] - s->at[1] * h[2]) * inverse : h[1];
-		s->radius[i][2] = h[2];
+		d->radius[i][0][lane] = perspective ? (h[0] - u * h[2]) * inverse : h[0];
+		d->radius[i][1][lane] = perspective ? (h[1] - v * h[2]) * inverse : h[1];
+		d->radius[i][2][lane] = h[2];
 	}
 }
 
@@ -43,6 +47,7 @@ void splat_cube(const struct splat_target *t, const struct bin_entry *entry)
 	const float(*normals)[3] = psr_direction_table();
 	const uint32_t *tens = psr_direction_tens();
 	const int perspective = t->plan->perspective;
+	struct discs discs;
 	struct warp_cube cube;
 	uint32_t k = 0;
 
@@ -55,8 +60,10 @@ void splat_cube(const struct splat_target *t, const struct bin_entry *entry)
 	for (int a = 0; a < 3; a++)
 		for (int c = 0; c < 3; c++)
 			axis[a][c] = RADIUS * edge * (float)in->cubes->axis[a][c];
-	struct splat s = { .rim = RIM_DEPTH * edge * t->plan->instance[entry->instance].cull.scale,
-		               .most = (float)((1 << entry->level) + 2) };
+	memset(&discs, 0, offsetof(struct discs, share)); /* lanes without a leaf */
+	discs.id = cube.id;
+	discs.rim = RIM_DEPTH * edge * t->plan->instance[entry->instance].cull.scale;
+	discs.most = (float)((1 << entry->level) + 2);
 	for (uint64_t left = cube.mask; left; left &= left - 1, k++) {
 		const uint32_t lane = (uint32_t)__builtin_ctzll(left);
 		float p[3], d[3], sight[3], tangent[2][3];
@@ -72,20 +79,21 @@ void splat_cube(const struct splat_target *t, const struct bin_entry *entry)
 		}
 		if (!(p[2] > t->plan->near_z))
 			continue;
-		if (entry->level >= LONG_DRAWN && plan_is_cancelled(t->plan))
-			return;
 		const float inverse = perspective ? 1 / p[2] : 1;
-		v3f_set(s.at, p[0] * inverse, p[1] * inverse, p[2]);
+		const float u = p[0] * inverse, v = p[1] * inverse;
 		for (int c = 0; c < 3; c++)
-			d[c] = (s.at[0] * in->du[c] + s.at[1] * in->dv[c]) + in->d0[c];
+			d[c] = (u * in->du[c] + v * in->dv[c]) + in->d0[c];
 		v3f_scale(sight, d, 1 / __builtin_sqrtf(v3f_dot(d, d)));
 		const float *n = cube.normal != NULL ? normals[cube.normal[k]] : sight;
 		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
 			continue;
 		find_tangents(tangent, n);
-		project_disc(&s, (const float(*)[3])tangent, (const float(*)[3])axis, perspective);
-		s.id = cube.id + lane;
-		limit_reach(&s);
-		draw_splat(t, &s, WORDS);
+		discs.at[0][lane] = u;
+		discs.at[1][lane] = v;
+		discs.at[2][lane] = p[2];
+		project_disc(&discs, lane, (const float(*)[3])tangent, (const float(*)[3])axis, perspective);
+		discs.mask |= UINT64_C(1) << lane;
 	}
+	t->simd->discs_place(&discs, t->tile);
+	splat_words(t, &discs, discs.mask, entry->level);
 }

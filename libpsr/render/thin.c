@@ -121,7 +121,7 @@ static void hang_veils(const struct veil_layer *layer, const struct sheer_drawin
 		const struct bin_entry *entry = &d->bins->entry[e];
 
 		if (entry->level >= WIDE_LEVEL && d->plan->with_splats) {
-			splat_veil(d->plan, entry, target, layer, WIDE_SHARE);
+			splat_veil(d->simd, d->plan, entry, target, layer, WIDE_SHARE);
 			continue;
 		}
 		find_square(&run[n], d, entry);

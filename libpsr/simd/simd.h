@@ -8,6 +8,7 @@
 #include "psr/render.h"
 #include "isa.h"
 #include "cull.h"
+#include "discs.h"
 #include "fill.h"
 #include "gaps.h"
 #include "reproject.h"
@@ -30,6 +31,9 @@ struct simd {
 	warp_fn *ewa_words;
 	warp_fn *ewa_sums;
 	veil_fn *veil;
+	discs_of_block_fn *discs_of_block;
+	discs_place_fn *discs_place;
+	discs_draw_fn *discs_draw;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;
 	strip_read_fn *strip_read;

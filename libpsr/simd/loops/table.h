@@ -2,6 +2,7 @@
  * instructions. Arguments: the name of the set, the kernel of reproject_look, and a macro that names a kernel's variant
  * where one is written by hand. */
 #include "cull.h"
+#include "discs.h"
 #include "fill_pull.h"
 #include "fill_push.h"
 #include "gaps.h"
@@ -27,6 +28,9 @@
 	.ewa_words = ewa_words_##isa,                  \
 	.ewa_sums = ewa_sums_##isa,                    \
 	.veil = veil_##isa,                            \
+	.discs_of_block = discs_of_block,              \
+	.discs_place = discs_place,                    \
+	.discs_draw = discs_draw,                      \
 	.strip_list = KERNEL(strip_list),              \
 	.strip_find = strip_find,                      \
 	.strip_read = KERNEL(strip_read),              \
