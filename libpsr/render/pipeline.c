@@ -159,7 +159,7 @@ static void gaps_one(int row, void *userdata)
 	struct buffers *b = &r->buffers;
 	const struct gaps_map map = map_of(r);
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(&r->plan, (uint32_t)row);
-	const struct splat_picture splats = { &r->plan, &b->stack, r->inside, b->offcuts };
+	const struct splat_picture splats = { r->simd, &r->plan, &b->stack, r->inside, b->offcuts };
 	struct psr_zstack stack = b->stack;
 
 	if (r->plan.with_splats)

@@ -3,7 +3,6 @@
 #include <string.h>
 #include "base/clock.h"
 #include "base/mem.h"
-#include "base/root.h"
 #include "base/srgb.h"
 #include "fine.h"
 #include "placed.h"
@@ -24,6 +23,7 @@
 _Static_assert(STEP_X % (1 << PSR_MAX_DEPTH_LEVEL) == 0 && STEP_Y % (1 << PSR_MAX_DEPTH_LEVEL) == 0,
                "cells stay where they are");
 _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
+_Static_assert(WINDOW_WIDTH <= AVERAGE_MOST, "its rows are averaged at once");
 
 struct refiner {
 	struct psr_renderer *renderer;
@@ -117,27 +117,7 @@ uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
 	return (w < WINDOW_WIDTH ? w : WINDOW_WIDTH) * (h < WINDOW_HEIGHT ? h : WINDOW_HEIGHT);
 }
 
-/* The mean of light, clamped at the end: highlights smaller than a pixel keep what they send. Squares are below 2^32, so
- * sums of 256 take 40 bits, and 16 more on the way to 16-bit linear light. */
-static void average_color(const struct part *part, size_t first, size_t at)
-{
-	const uint32_t side = 1u << part->pass, bits = PSR_ROOT_BITS + 2 * part->pass;
-
-	for (size_t c = 0; c < 3; c++) {
-		uint64_t sum = 0;
-
-		for (uint32_t j = 0; j < side; j++) {
-			const uint16_t *root = part->light.channel[c] + first + (size_t)j * part->stride;
-
-			for (uint32_t i = 0; i < side; i++)
-				sum += (uint64_t)root[i] * root[i];
-		}
-		const uint64_t mean = (sum * 65535 + (UINT64_C(1) << (bits - 1))) >> bits;
-		part->frame->rgb[3 * at + c] = part->refiner->srgb[mean < 65535 ? mean : 65535];
-	}
-}
-
-/* The same of a fine picture's 2x2 colours, which smoothing has clamped. */
+/* The mean of the 2x2 colours of a fine picture, which smoothing has clamped. */
 static void average_codes(const struct part *part, size_t first, size_t at)
 {
 	const uint8_t *top = part->rgb + 3 * first, *bottom = top + 3 * (size_t)part->stride;
@@ -150,37 +130,24 @@ static void average_codes(const struct part *part, size_t first, size_t at)
 	}
 }
 
-static void find_nearest(const struct part *part, size_t first, size_t at)
-{
-	const uint32_t side = 1u << part->pass;
-	float nearest = INFINITY;
-
-	for (uint32_t j = 0; j < side; j++)
-		for (uint32_t i = 0; i < side; i++) {
-			const float z = part->refiner->depth[first + (size_t)j * part->stride + i];
-
-			nearest = z < nearest ? z : nearest;
-		}
-	part->frame->depth[at] = nearest;
-}
-
 static void average_row(int row, void *userdata)
 {
 	const struct part *part = userdata;
-	const uint32_t side = 1u << part->pass, y = part->y0 + (uint32_t)row;
+	const struct simd *simd = renderer_simd(part->refiner->renderer);
+	const uint32_t y = part->y0 + (uint32_t)row, n = part->x1 - part->x0, side = 1u << part->pass;
+	const size_t first = (size_t)(part->top + (uint32_t)row * side) * part->stride + part->left;
+	const size_t at = (size_t)y * part->frame->width + part->x0;
+	uint16_t light[WINDOW_WIDTH];
 
-	for (uint32_t x = part->x0; x < part->x1; x++) {
-		const size_t first =
-			(size_t)(part->top + (uint32_t)row * side) * part->stride + part->left + (x - part->x0) * side;
-		const size_t at = (size_t)y * part->frame->width + x;
-
-		if (part->rgb != NULL)
-			average_codes(part, first, at);
-		else if (part->frame->rgb != NULL)
-			average_color(part, first, at);
-		if (part->frame->depth != NULL)
-			find_nearest(part, first, at);
+	for (uint32_t x = 0; part->rgb != NULL && x < n; x++)
+		average_codes(part, first + 2 * (size_t)x, at + x);
+	for (uint32_t c = 0; part->rgb == NULL && part->frame->rgb != NULL && c < 3; c++) {
+		simd->average_light(light, part->light.channel[c] + first, part->stride, n, part->pass);
+		for (uint32_t x = 0; x < n; x++)
+			part->frame->rgb[3 * (at + x) + c] = part->refiner->srgb[light[x]];
 	}
+	if (part->frame->depth != NULL)
+		simd->average_depth(part->frame->depth + at, part->refiner->depth + first, part->stride, n, part->pass);
 }
 
 static int loop(const struct still *still, int n, void (*fn)(int i, void *userdata), void *userdata)

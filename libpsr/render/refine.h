@@ -20,4 +20,7 @@ struct wide_light {
 };
 struct wide_light renderer_light(const struct psr_renderer *renderer);
 
+/* The kernels that it draws with. */
+const struct simd *renderer_simd(const struct psr_renderer *renderer);
+
 #endif

@@ -56,6 +56,11 @@ void renderer_set_inside(struct psr_renderer *r, const struct inside *inside)
 	r->inside = inside;
 }
 
+const struct simd *renderer_simd(const struct psr_renderer *r)
+{
+	return r->simd;
+}
+
 struct wide_light renderer_light(const struct psr_renderer *r)
 {
 	const struct buffers *b = &r->buffers;

@@ -5,6 +5,7 @@
 #include "gaps.h"
 #include "warp.h"
 #include "simd/discs.h"
+#include "simd/holes.h"
 
 /* Pixels where something was cut off a disc: a bit a pixel, the lowest first. */
 struct splat_offcuts {
@@ -50,6 +51,7 @@ struct inside {
 
 /* A picture of splats. */
 struct splat_picture {
+	const struct simd *simd;
 	const struct plan *plan;
 	const struct psr_zstack *stack;
 	const struct inside *inside;  /* NULL: unknown */

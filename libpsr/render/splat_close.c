@@ -7,15 +7,13 @@
 #include "block.h"
 #include "splat.h"
 
-#define REACH 8 /* pixels, a power of two: how far from a hole its enclosing surface may be */
 /* Cells to look at on each side of a pixel's own: a gap in a full row of cells is narrower than two of them. */
 #define GAP 1
 /* Pixels to look at on each side of an empty one between magnified samples: a window's margin has as many. */
 #define MOST_ACROSS 64
 /* Sine of the angle below which a surface is seen steeply from the side. Measured. */
 #define STEEP 0.2f
-#define CELLS (TILE_WIDTH / 2)
-#define CELLS_AROUND (CELLS + 2 * GAP)
+#define CELLS_AROUND (HOLES_CELLS + 2 * GAP)
 
 /* Eight directions: each, then its opposite. */
 static const int8_t way[8][2] = {
@@ -193,47 +191,6 @@ static int is_seam(const struct splat_picture *s, uint32_t x, uint32_t y, int le
 	return n_left <= 0;
 }
 
-/* Finds for n pixels from x on whether something nearer is within REACH on the left and on the right. */
-static void find_between(uint8_t *is_between, const struct splat_picture *s, uint32_t x, uint32_t y, uint32_t n)
-{
-	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of REACH pixels from this one on */
-	const uint32_t first = x ? 0 : REACH, beyond = s->stack->width - x;
-	const uint32_t end = beyond < n + REACH ? beyond + REACH : n + 2 * REACH;
-	const float scale = s->plan->gap_scale[1], offset = s->plan->gap_offset[1];
-	const uint64_t *word = psr_zstack_row(s->stack, y) + x;
-	int has_any = 0;
-
-	for (uint32_t i = 0; i < REACH; i++)
-		nearest[i] = nearest[n + REACH + i] = z[i] = z[n + REACH + i] = INFINITY;
-	for (uint32_t i = first; i < end; i++) {
-		const uint32_t bits = (uint32_t)(word[(int32_t)i - REACH] >> 32);
-
-		nearest[i] = z[i] = psr_float_from_bits(bits);
-		has_any |= bits < (uint32_t)(PSR_WORD_EMPTY >> 32);
-	}
-	if (!has_any) {
-		memset(is_between, 0, n);
-		return;
-	}
-	for (uint32_t step = 1, left = n + 2 * REACH; step < REACH; step *= 2) {
-		left -= step;
-		for (uint32_t i = 0; i < left; i++)
-			nearest[i] = nearest[i] < nearest[i + step] ? nearest[i] : nearest[i + step];
-	}
-	for (uint32_t i = 0; i < n; i++) {
-		const float before = nearest[i], behind = nearest[i + REACH + 1], farther = before > behind ? before : behind;
-
-		is_between[i] = farther * scale + offset < z[i + REACH];
-	}
-}
-
-/* A tile's row of cells of a level. */
-struct cell_row {
-	float limit[CELLS];     /* a greater depth is behind samples of all cells around */
-	uint8_t is_near[CELLS]; /* a block of this level has samples in the cell or beside it */
-	int has_any;
-};
-
 /* Finds the nearest z' of n cells from (i, j) on, of their level's samples and of finer levels'. (0, 0) is the guard
  * band's corner; cells beyond the guard band are empty. */
 static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, int64_t i, int64_t j, uint32_t n)
@@ -278,7 +235,7 @@ static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, ui
 }
 
 /* Fills in n cells from (i, j) on, which lie inside the guard band. */
-static void find_cells(struct cell_row *to, const struct splat_picture *s, int k, uint32_t i, uint32_t j, uint32_t n)
+static void find_cells(struct hole_cells *to, const struct splat_picture *s, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
 	const uint32_t n_around = n + 2 * GAP;
@@ -304,31 +261,6 @@ static void find_cells(struct cell_row *to, const struct splat_picture *s, int k
 	}
 }
 
-/* Properties of the pixels in a row of a tile. */
-struct row_holes {
-	uint8_t is_between[TILE_WIDTH]; /* something nearer is on its left and on its right */
-	uint8_t is_covered[TILE_WIDTH]; /* samples in all cells around are nearer */
-	uint8_t level[TILE_WIDTH];      /* of the coarsest cells around; 0: none */
-};
-
-static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack, uint32_t x,
-                       uint32_t y, uint32_t n)
-{
-	const uint64_t *word = psr_zstack_row(stack, y) + x;
-
-	memset(to, 0, sizeof *to);
-	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
-		if (!(stack->levels >> k & 1) || !cells[k].has_any)
-			continue;
-		for (uint32_t c = 0; c < n; c++) {
-			const float z = psr_float_from_bits((uint32_t)(word[c] >> 32));
-
-			to->is_covered[c] |= cells[k].is_near[c >> k] & (cells[k].limit[c >> k] < z);
-			to->level[c] = cells[k].is_near[c >> k] ? (uint8_t)k : to->level[c];
-		}
-	}
-}
-
 /* Whether a pixel well inside the plain frame's object lies in a crack. */
 static int is_crack(const struct splat_picture *s, int is_covered, int level, uint32_t x, uint32_t y)
 {
@@ -339,20 +271,25 @@ static int is_crack(const struct splat_picture *s, int is_covered, int level, ui
 	return is_covered && is_narrow(s, x, y, level);
 }
 
-static uint32_t close_row(const struct splat_picture *s, const struct cell_row *cells, uint32_t x0, uint32_t y,
+static uint32_t close_row(const struct splat_picture *s, const struct hole_cells *cells, uint32_t x0, uint32_t y,
                           uint32_t n, const struct gaps_map *map)
 {
 	const uint32_t width = s->stack->width, bricks_x = (width + BRICK - 1) / BRICK;
 	uint16_t *weight = map->weight + (size_t)y * width + x0;
 	uint8_t *bricks = map->bricks + (size_t)(y / BRICK) * bricks_x;
-	struct row_holes holes;
+	struct hole_row holes;
 	uint32_t n_closed = 0;
+	uint32_t levels = 0;
 
-	find_holes(&holes, cells, s->stack, x0, y, n);
-	find_between(holes.is_between, s, x0, y, n);
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
+		levels |= (s->stack->levels >> k & 1 && cells[k].has_any ? 1u : 0) << k;
+	if (levels == 0)
+		return 0;
+	s->simd->holes(&holes, cells, levels, psr_zstack_row(s->stack, y), width, x0, n, s->plan->gap_scale[1],
+	               s->plan->gap_offset[1]);
 	for (uint32_t c = 0; c < n; c++) {
 		const uint32_t x = x0 + c;
-		const int level = holes.level[c], reach = 1 << level < REACH ? 1 << level : REACH;
+		const int level = holes.level[c], reach = 1 << level < HOLES_REACH ? 1 << level : HOLES_REACH;
 
 		if (weight[c] && level
 		    && ((is_inside(s, x, y) && is_crack(s, holes.is_covered[c], level, x, y))
@@ -371,7 +308,7 @@ _Static_assert(TILE_WIDTH % (1 << PSR_MAX_DEPTH_LEVEL) == 0, "a tile's row has w
 uint32_t splat_close(const struct splat_picture *s, uint32_t y0, uint32_t y1, const struct gaps_map *map)
 {
 	const struct psr_zstack *stack = s->stack;
-	struct cell_row cells[PSR_MAX_DEPTH_LEVEL + 1];
+	struct hole_cells cells[PSR_MAX_DEPTH_LEVEL + 1];
 	uint32_t n_closed = 0;
 
 	for (uint32_t x = 0; x < stack->width; x += TILE_WIDTH) {

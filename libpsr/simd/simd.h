@@ -7,10 +7,12 @@
 
 #include "psr/render.h"
 #include "isa.h"
+#include "average.h"
 #include "cull.h"
 #include "discs.h"
 #include "fill.h"
 #include "gaps.h"
+#include "holes.h"
 #include "reproject.h"
 #include "shadow.h"
 #include "smooth.h"
@@ -46,12 +48,15 @@ struct simd {
 	strip_write_fn *strip_write;
 	depth_row_fn *depth_row;
 	gaps_fn *gaps;
+	holes_fn *holes;
 	fill_pull_weights_fn *fill_pull_weights;
 	fill_pull_colors_fn *fill_pull_colors;
 	fill_push_fn *fill_push;
 	fill_push_picture_fn *fill_push_picture;
 	fill_depths_fn *fill_depths;
 	smooth_fn *smooth;
+	average_light_fn *average_light;
+	average_depth_fn *average_depth;
 	reproject_depths_fn *reproject_depths;
 	reproject_texels_fn *reproject_texels;
 	reproject_fit_fn *reproject_fit;

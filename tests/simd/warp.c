@@ -1,4 +1,4 @@
-/* warp, veil, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every
+/* warp, discs, veil, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every
  * level of the depth buffer. */
 #include <math.h>
 #include <string.h>
@@ -125,6 +125,31 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 		check_result(c, c->simd->warp(&p->target, entry, n_entries));
 }
 
+/* The blocks as discs, some shrunk, and of some blocks but a part. */
+static void disc_blocks(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples, double step,
+                        enum numbers numbers)
+{
+	const struct bin_entry *entry = make_entries(c, p, n_entries, n_samples, step, numbers);
+	const float most = check_one_in(c, 3) ? 3 : 130, rim = (float)check_real(c, 0, 0.01);
+	const uint64_t some = check_one_in(c, 3) ? check_u64(c) : UINT64_MAX;
+
+	while (check_next(c)) {
+		uint64_t n_discs = 0;
+
+		for (uint32_t e = 0; e < n_entries; e++) {
+			struct discs discs;
+
+			c->simd->discs_of_block(&discs, &p->target, &entry[e]);
+			discs.most = most;
+			discs.rim = rim;
+			c->simd->discs_place(&discs, &p->target);
+			c->simd->discs_draw(&p->target, &discs, discs.mask & some);
+			n_discs += (uint64_t)__builtin_popcountll(discs.mask);
+		}
+		check_result(c, n_discs);
+	}
+}
+
 /* The blocks as points, or as squares of up to `most_side` pixels. */
 static void veil_blocks(struct check *c, struct picture *p, const struct bin_entry *bin, uint32_t n, uint32_t most_side)
 {
@@ -200,6 +225,25 @@ static void narrow_tiles(struct check *c)
 	warp_blocks(c, &p, 1 + check_below(c, 12), 0, exp2(check_real(c, -3, 3)), PLAIN);
 }
 
+static void random_discs(struct check *c)
+{
+	static const enum numbers kinds[] = { PLAIN, PLAIN, SPOILT, EDGES };
+	const enum numbers numbers = kinds[check_below(c, sizeof kinds / sizeof kinds[0])];
+	struct picture p;
+
+	picture_random(c, &p);
+	disc_blocks(c, &p, check_below(c, 20), 0, exp2(check_real(c, -4, 5)), numbers);
+}
+
+static void discs_in_narrow_tiles(struct check *c)
+{
+	const uint32_t w = check_one_in(c, 2) ? 1 + check_below(c, 17) : TILE_WIDTH + 1 + check_below(c, 17);
+	struct picture p;
+
+	picture_make(c, &p, w, check_one_in(c, 2) ? 1 : TILE_HEIGHT + 1, check_u32(c));
+	disc_blocks(c, &p, 1 + check_below(c, 12), 0, exp2(check_real(c, -1, 4)), PLAIN);
+}
+
 static void random_clear(struct check *c)
 {
 	struct picture p;
@@ -235,6 +279,22 @@ static void bench_full_blocks(struct check *c)
 	struct picture p;
 	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
 	warp_blocks(c, &p, 400, 64, 0.7, PLAIN);
+}
+
+static void bench_small_discs(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	disc_blocks(c, &p, 400, 40, 2, PLAIN);
+}
+
+static void bench_discs(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	disc_blocks(c, &p, 400, 40, 8, PLAIN);
 }
 
 static void bench_thirds(struct check *c)
@@ -294,12 +354,16 @@ int main(int argc, char **argv)
 		{ "warp: infinite, huge, denormal and no numbers", spoilt_numbers, 1500, NULL },
 		{ "warp: samples on the edges of pixels and tiles, and at near_z", edges, 500, NULL },
 		{ "warp: tiles narrower than a vector", narrow_tiles, 500, NULL },
+		{ "discs: random blocks and tiles", random_discs, 1500, NULL },
+		{ "discs: tiles narrower than a vector", discs_in_narrow_tiles, 500, NULL },
 		{ "veil: points and squares in random tiles", random_veils, 1500, NULL },
 		{ "warp_clear: random tiles, clean parts and levels", random_clear, 400, NULL },
 		{ "warp_cells: random tiles, bare parts and levels", random_cells, 400, NULL },
 		{ "warp_far: random tiles", random_far, 400, NULL },
 		{ "warp, full blocks", bench_full_blocks, 0, "sample" },
 		{ "warp, blocks a third full", bench_thirds, 0, "sample" },
+		{ "discs, 2 pixels between samples", bench_small_discs, 0, "sample" },
+		{ "discs, 8 pixels between samples", bench_discs, 0, "sample" },
 		{ "veil, points of blocks a third full", bench_veils, 0, "sample" },
 		{ "warp, full blocks, depth levels 1 and 2", bench_levels, 0, "sample" },
 		{ "warp_clear, a tile", bench_clear, 0, "pixel" },

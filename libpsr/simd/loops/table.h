@@ -1,12 +1,14 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
  * instructions. Arguments: the name of the set, the kernel of reproject_look, and a macro that names a kernel's variant
  * where one is written by hand. */
+#include "average.h"
 #include "cull.h"
 #include "discs.h"
 #include "fill_pull.h"
 #include "fill_push.h"
 #include "gaps.h"
 #include "simd/kernels.h"
+#include "holes.h"
 #include "light.h"
 #include "points.h"
 #include "reproject.h"
@@ -43,12 +45,15 @@
 	.strip_write = KERNEL(strip_write),            \
 	.depth_row = depth_row,                        \
 	.gaps = gaps,                                  \
+	.holes = holes,                                \
 	.fill_pull_weights = KERNEL(fill_pull_weights),\
 	.fill_pull_colors = KERNEL(fill_pull_colors),  \
 	.fill_push = KERNEL(fill_push),                \
 	.fill_push_picture = KERNEL(fill_push_picture),\
 	.fill_depths = fill_depths,                    \
 	.smooth = smooth,                              \
+	.average_light = average_light,                \
+	.average_depth = average_depth,                \
 	.reproject_depths = reproject_depths,          \
 	.reproject_texels = reproject_texels,          \
 	.reproject_fit = reproject_fit,                \

@@ -131,7 +131,7 @@ static uint32_t n_closed(const struct seam *seam)
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1u << seam->level };
 	const struct inside inside = { is_inside, WIDTH / 16, 0, 0, 4 };
-	const struct splat_picture picture = { &plan, &stack, &inside, { bits, WIDTH / 8 } };
+	const struct splat_picture picture = { simd_get(), &plan, &stack, &inside, { bits, WIDTH / 8 } };
 
 	const uint32_t cells_x = (WIDTH >> seam->level) + 2, cells_y = (HEIGHT >> seam->level) + 2;
 

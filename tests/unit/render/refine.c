@@ -431,7 +431,7 @@ static void holes_between_discs_are_closed_and_slots_and_notches_are_not(void **
 	uint8_t bricks[WIDTH / BRICK * HEIGHT / BRICK] = { 0 };
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << LEVEL };
-	const struct splat_picture picture = { .plan = &plan, .stack = &stack };
+	const struct splat_picture picture = { .simd = simd_of(PSR_ISA_C), .plan = &plan, .stack = &stack };
 
 	(void)state;
 	assert_true(word && weight && cell);
@@ -522,7 +522,7 @@ static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
 	const struct inside inside = { is_inside, WIDTH / 8, 0, 0, 3 };
-	const struct splat_picture picture = { .plan = &plan, .stack = &stack, .inside = &inside };
+	const struct splat_picture picture = { .simd = simd_of(PSR_ISA_C), .plan = &plan, .stack = &stack, .inside = &inside };
 
 	(void)state;
 	stack.level[3].z = cell;
@@ -565,7 +565,7 @@ static uint32_t n_rows_closed(uint32_t n_rows, float beyond, const float normal[
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
 	const struct inside inside = { is_inside, WIDTH / 8, 0, 0, 3 };
-	const struct splat_picture picture = { .plan = &plan, .stack = &stack, .inside = &inside };
+	const struct splat_picture picture = { .simd = simd_of(PSR_ISA_C), .plan = &plan, .stack = &stack, .inside = &inside };
 
 	stack.level[3].z = cell;
 	stack.level[3].width = CELLS_X;
@@ -637,7 +637,7 @@ static void cracks_of_magnified_samples_are_closed_beside_empty_cells(void **sta
 		uint8_t bricks[2], is_inside[WIDTH / 2 * HEIGHT / 2];
 		const struct gaps_map map = { weight, bricks };
 		const struct inside inside = { is_inside, WIDTH >> pass, 0, 0, pass };
-		const struct splat_picture picture = { .plan = &plan, .stack = &stack, .inside = &inside };
+		const struct splat_picture picture = { .simd = simd_of(PSR_ISA_C), .plan = &plan, .stack = &stack, .inside = &inside };
 		memset(is_inside, 1, sizeof is_inside);
 		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
 			weight[i] = WEIGHT_ONE;
