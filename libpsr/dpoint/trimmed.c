@@ -57,10 +57,10 @@ static double area_of(const struct polygon *p)
 
 /* ---- cells ---- */
 
-static int refuse(struct psr_error *err, const struct sampling *s)
+int dpoint_trimmed_refuse(double cell, struct psr_error *err)
 {
 	return psr_fail(err, PSR_ERR_LIMIT, "the surface would be covered in more than %u pieces of %g; build blocks",
-	                TRIM_MOST_CELLS, s->options->cell);
+	                TRIM_MOST_CELLS, cell);
 }
 
 /* Turns the frame until x is along a direction, as seen on the tangent plane. */
@@ -336,6 +336,6 @@ int dpoint_sample_trimmed(struct dpoint_surface *surface, const struct psr_patch
 		rc = trim_put_rims(surface, &s.grid, patch, options);
 	trim_fini(&s.grid);
 	if (rc == PSR_ERR_LIMIT)
-		return refuse(err, &s);
+		return dpoint_trimmed_refuse(options->cell, err);
 	return rc == PSR_ERR_MEMORY ? psr_fail(err, rc, "no memory for the pieces of a face") : rc;
 }

@@ -25,4 +25,7 @@ struct dpoint_trimmed_options {
 int dpoint_sample_trimmed(struct dpoint_surface *surface, const struct psr_patch *patch,
                           const struct dpoint_trimmed_options *options, struct psr_error *err);
 
+/* Fails with the error of too many cells, for patches that have them together. Returns LIMIT. */
+int dpoint_trimmed_refuse(double cell, struct psr_error *err);
+
 #endif

@@ -22,6 +22,9 @@ struct building {
 void building_say(const struct building *b, const char *stage);
 struct dpoint_cover_options building_cover(const struct dpoint_build_options *options);
 
+/* Fills the surface with the pieces of a mesh and of its patches, and finds sides. LIMIT, FORMAT, MEMORY. */
+int building_put_mesh(struct building *b);
+
 /* Fills the surface with a cloud's points, and finds sides. LIMIT, FORMAT, MEMORY. */
 int building_put_cloud(struct building *b);
 

@@ -6,17 +6,10 @@
 #include "base/clock.h"
 #include "base/vec.h"
 #include "dpoint/bound.h"
-#include "dpoint/mesh.h"
-#include "dpoint/trimmed.h"
-#include "model/blocks.h"
-#include "sample/octree/of_mesh.h"
-#include "surface/texture.h"
 #include "surface/validate.h"
 
 #define OVERHANG 5e-4f
 #define SLACK 2e-5f       /* half a step of a place */
-#define HEM 1e-4f         /* twice of what rims of patches are off at most (import/cad) */
-#define MARGIN 0.08f      /* of points of patches: from 2 degrees aslant no step between flat ones shows (0139) */
 #define SPARSE 4          /* of candidates that come in two turns */
 
 void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)
@@ -46,51 +39,6 @@ static int check_options(const struct dpoint_build_options *o, struct psr_error 
 		                " for %.2g or more, or a lower resolution", o->error, o->resolution,
 		                1.01 * BOUND_PACKING * o->resolution);
 	return PSR_OK;
-}
-
-/* The look of a place in the middle of a piece, filtered over the piece; *attr without a normal. */
-static int look_at(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr)
-{
-	const struct building *b = userdata;
-	const struct surface_place place = { .prim = triangle, .u = u, .v = v };
-	float normal[3];
-
-	if (b->mesh->material[b->mesh->triangle_material[triangle]].alpha != PSR_ALPHA_OPAQUE
-	    && texture_is_absent(b->mesh, triangle, u, v))
-		return 0;
-	*attr = surface_look(&b->look, &place, 2.0 / b->options->resolution, normal) & ~(uint64_t)PSR_ATTR_NORMAL(UINT64_MAX);
-	return 1;
-}
-
-static int is_opaque_alone(const struct psr_mesh *mesh)
-{
-	for (uint32_t m = 0; m < mesh->n_materials; m++)
-		if (mesh->material[m].alpha != PSR_ALPHA_OPAQUE)
-			return 0;
-	return 1;
-}
-
-/* A closed surface that nothing shows the inside of is seen from outside. */
-static int find_sides(struct building *b)
-{
-	const struct psr_mesh *mesh = b->mesh;
-	uint8_t *is_turned = NULL;
-	int is_closed = 0, n_turned = 0;
-	int rc = octree_mesh_sides(&is_turned, &is_closed, mesh);
-
-	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++)
-		n_turned += is_turned[t];
-	for (uint32_t m = 0; m < mesh->n_materials; m++)
-		b->two_sided[m] = mesh->material[m].two_sided && !(is_closed && n_turned == 0 && is_opaque_alone(mesh));
-	free(is_turned);
-	return rc;
-}
-
-/* What changes within a pixel is not seen at the resolution. */
-static void find_grains(struct building *b)
-{
-	for (uint32_t m = 0; m < b->mesh->n_materials; m++)
-		b->grain[m] = b->look.is_plain[m] && b->mesh->color == NULL ? 0 : 2.0 / b->options->resolution;
 }
 
 static double pixel_of(const struct dpoint_build_options *o)
@@ -130,62 +78,12 @@ struct dpoint_cover_options building_cover(const struct dpoint_build_options *o)
 	return cover;
 }
 
-/* A patch looks as its first triangle does; one whose triangles are all without an area has no look, and nothing to
- * cover. */
-static int put_patches(struct building *b, const struct dpoint_cover_options *cover)
-{
-	struct dpoint_trimmed_options o = {
-		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = b->options->piece, .turn = 0.5 * (double)cover->sine, .delta = cover->delta,
-		.hem = (double)fminf(HEM, 0.5f * cover->overhang),
-	};
-	uint32_t *first = malloc(b->mesh->n_patches * sizeof *first);
-	int rc = PSR_OK;
-
-	if (first == NULL)
-		return psr_fail(b->err, PSR_ERR_MEMORY, "no memory for %u patches", b->mesh->n_patches);
-	memset(first, 0xff, b->mesh->n_patches * sizeof *first);
-	for (uint32_t t = b->mesh->n_triangles; t-- > 0;)
-		if (b->mesh->triangle_patch[t] != UINT32_MAX)
-			first[b->mesh->triangle_patch[t]] = t;
-	for (uint32_t i = 0; i < b->mesh->n_patches && rc == PSR_OK; i++)
-		if (first[i] != UINT32_MAX && look_at(b, first[i], 1.0 / 3, 1.0 / 3, &o.attr))
-			rc = dpoint_sample_trimmed(&b->surface, &b->mesh->patch[i], &o, b->err);
-	free(first);
-	b->surface.margin = MARGIN;
-	return rc;
-}
-
-static int put_mesh(struct building *b)
-{
-	const struct dpoint_build_options *o = b->options;
-	const struct dpoint_cover_options cover = building_cover(o);
-	const struct dpoint_mesh_options mesh = {
-		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = o->piece, .delta = cover.delta, .grain_of = b->grain,
-		.cover = &cover,
-		.looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
-	};
-	int rc;
-
-	rc = find_sides(b);
-	if (rc != PSR_OK)
-		return psr_fail(b->err, rc, "no memory for the sides of %u triangles", b->mesh->n_triangles);
-	find_grains(b);
-	rc = dpoint_sample_mesh(&b->surface, b->mesh, &mesh, b->err);
-	if (rc == PSR_OK && b->mesh->n_patches > 0)
-		rc = put_patches(b, &cover);
-	if (rc == PSR_OK && b->surface.n_candidates == 0)
-		rc = psr_fail(b->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", b->mesh->n_triangles);
-	return rc;
-}
-
 static int choose(struct building *b, struct dpoint_set *set, struct dpoint_build_report *report)
 {
 	int rc;
 
 	building_say(b, "sample");
-	rc = b->mesh->n_triangles > 0 ? put_mesh(b) : building_put_cloud(b);
+	rc = b->mesh->n_triangles > 0 ? building_put_mesh(b) : building_put_cloud(b);
 	if (rc != PSR_OK)
 		return rc;
 	building_say(b, "choose");
