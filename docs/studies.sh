@@ -13,7 +13,7 @@ scans=$(ls "$fetched/dragon.ply" "$fetched/armadillo.off" "$fetched/bunny.obj" 2
 
 [ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-offsets \
 	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats dpoint \
-	dpoint-models dpoint-splats dpoint-frames dpoint-holes dpoint-error
+	dpoint-models dpoint-splats dpoint-frames dpoint-equal dpoint-holes dpoint-error
 for study; do
 	echo "study $study" >&2
 	plot=()

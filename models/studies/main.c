@@ -99,6 +99,11 @@ static const struct study_kind tables[] = {
 	{ "dpoint", "[K] table 1", "differential points: simplification", table_dpoint, "teapot",
 	  "kB: [K]'s points have 62 bytes, ours 16, and fitted ones are in groups. Errors, in degrees and radii\n"
 	  "of the model, are those of each kept point at each place that it covers; holes: what no point covers.", NULL },
+	{ "dpoint-equal", "[K] 6", "a highlight at magnification 8: points, and blocks of as much time", table_dpoint_equal,
+	  "teapot,toybird",
+	  "Pictures of 800x600, as those of dpoint-frames; points, and blocks of as many pixels or more. edges: smoothed;\n"
+	  "pass 1: of 2x2 sub-pixels. kB: in memory. dB: inside the object; bright: of its bright pixels; points': what points\n"
+	  "have more. equal time: the best of the ways that take no longer than the fastest that takes as long as points do.", NULL },
 	{ "dpoint-error", "[K] 7", "differential points within an error", table_dpoint_error, "teapot,top",
 	  "An error is what psr-model build --error asks for, in pixels of the resolution. off by: no drawn place is further\n"
 	  "from the mesh, as is proven; over: points that are further off than asked.", NULL },

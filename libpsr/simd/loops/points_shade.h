@@ -10,25 +10,39 @@ _Static_assert(STRIP <= POINTS_BATCH && STRIP_PADDING <= POINTS_VECTOR, "a strip
 /* Pixels that follow each other often show one point, which is unpacked once. */
 struct points_runs {
 	struct points_unpacked p;
-	uint32_t id[STRIP + 1];
+	uint32_t id[STRIP + 1 + POINTS_VECTOR];
 	float begin[3][POINTS_ROOM];            /* the eye from the point */
 	uint32_t run[STRIP + POINTS_VECTOR];    /* of a pixel */
 	/* By pixel. */
 	float at[3][STRIP + POINTS_VECTOR], axis[3][3][STRIP + POINTS_VECTOR], lambda[2][STRIP + POINTS_VECTOR];
 };
 
+/* Tells the runs of pixels, and their ids; returns the last one. Sets of instructions may have a way of their own, which
+ * may write POINTS_VECTOR values beyond. */
+static inline uint32_t points_find_runs(uint32_t *run, uint32_t *id_of_run, const uint32_t *id, uint32_t first,
+                                        uint32_t end)
+{
+	uint32_t n = 0;
+
+	for (uint32_t i = first; i < end; i++) {
+		n += i > first && id[i] != id[i - 1];
+		id_of_run[n] = id[i];
+		run[i] = n;
+	}
+	return n;
+}
+
+#ifndef POINTS_FIND_RUNS
+#define POINTS_FIND_RUNS points_find_runs
+#endif
+
 static inline void list_runs(struct points_runs *to, const struct strip_pixels *p, const struct warp_instance *in,
                              uint32_t first, uint32_t end)
 {
 	const struct warp_points *points = in->points;
 	const struct dpoint_set *set = points->model->set;
-	uint32_t n = 0;
+	const uint32_t n = POINTS_FIND_RUNS(to->run, to->id, p->id, first, end);
 
-	for (uint32_t i = first; i < end; i++) {
-		n += i > first && p->id[i] != p->id[i - 1];
-		to->id[n] = p->id[i];
-		to->run[i] = n;
-	}
 	to->p.n = n + 1;
 	for (uint32_t r = 0; r <= n; r++) {
 		const struct dpoint_group *g = &set->group[to->id[r] / PSR_BLOCK_SAMPLES - in->first_slot];

@@ -17,7 +17,7 @@ static const struct study_column columns[N_COLUMNS] = {
 
 static int put_frames(double value[N_COLUMNS], struct dpoint_view *view, struct study_dpoint *made)
 {
-	struct dpoint_way way[2] = { { NULL, 0 }, { NULL, 0 } }; /* diffuse, specular */
+	struct dpoint_way way[2] = { { .model = NULL }, { .model = NULL } }; /* diffuse, specular */
 	struct psr_errors errors;
 	double fps[2], bright;
 	int rc = PSR_OK;

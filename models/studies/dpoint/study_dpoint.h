@@ -75,6 +75,9 @@ int table_dpoint_holes(struct study *study);
 int table_dpoint_meshes(struct study *study);
 int table_dpoint_error(struct study *study);
 int table_dpoint_frames(struct study *study);
+
+/* A magnified highlight, with blocks of as much time. */
+int table_dpoint_equal(struct study *study);
 int table_dpoint_models(struct study *study);
 
 #endif

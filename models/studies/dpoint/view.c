@@ -64,7 +64,16 @@ static void set_scene(struct dpoint_view *view, double across, int is_close)
 static int draw(struct dpoint_view *view, const struct dpoint_way *way, struct psr_frame *frame)
 {
 	struct render_settings settings;
+	struct psr_settings of_sub_pixels;
 
+	if (way->pass > 0 || way->smooth != PSR_SMOOTH_NONE) {
+		psr_settings_default(&of_sub_pixels, WIDTH, HEIGHT);
+		of_sub_pixels.smooth = way->smooth;
+		of_sub_pixels.pass = way->pass;
+		view->instance.model = way->model;
+		return psr_render(view->study->renderer, &view->scene, &of_sub_pixels, view->study->pool, frame,
+		                  view->study->err);
+	}
 	render_settings_default(&settings, WIDTH, HEIGHT);
 	settings.with_ewa = way->with_ewa;
 	view->instance.model = way->model;

@@ -7,7 +7,7 @@
 
 #define DPOINT_VIEW_WIDTH 800
 #define DPOINT_VIEW_HEIGHT 600
-#define DPOINT_VIEW_MOST_WAYS 4
+#define DPOINT_VIEW_MOST_WAYS 8
 #define DPOINT_VIEW_WHOLE 2.3 /* radii across which the whole model is in the picture */
 #define DPOINT_VIEW_ROUGHNESS 0.25f
 
@@ -27,6 +27,8 @@ struct dpoint_view {
 struct dpoint_way {
 	struct psr_model *model;
 	int with_ewa;
+	enum psr_smooth smooth;
+	unsigned pass;
 };
 
 /* Needs study->renderer. dpoint_view_fini() is due even on failure. MEMORY. */

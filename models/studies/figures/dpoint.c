@@ -40,7 +40,7 @@ static void drawn_fini(struct drawn *drawn)
 
 static struct dpoint_way way_of(const struct drawn *drawn, int view)
 {
-	return (struct dpoint_way){ drawn->model[view != DIFFUSE], drawn->with_ewa };
+	return (struct dpoint_way){ .model = drawn->model[view != DIFFUSE], .with_ewa = drawn->with_ewa };
 }
 
 static int score(struct drawn *drawn, struct splats *s, int view)

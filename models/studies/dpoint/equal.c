@@ -1,0 +1,154 @@
+/* A highlight, magnified: points beside blocks that get as much time, as finer models or more sub-pixels. */
+#include <math.h>
+#include "model/points.h"
+#include "model/tree.h"
+#include "models/studies/tables/tables.h"
+#include "study_dpoint.h"
+#include "view.h"
+
+#define MAGNIFICATION 8
+
+enum { KB, FPS, DB, GAIN, BRIGHT, BRIGHT_GAIN, N_COLUMNS };
+
+static const struct study_column columns[N_COLUMNS] = {
+	[KB] = { "kB", "kilobytes", 0 }, [FPS] = { "fps", "frames_per_second", 0 }, [DB] = { "dB", "db", 2 },
+	[GAIN] = { "points'", "gain_db", 2 }, [BRIGHT] = { "bright", "bright_db", 2 },
+	[BRIGHT_GAIN] = { "points'", "bright_gain_db", 2 },
+};
+
+/* The first are points. */
+static const struct setting {
+	const char *name;
+	int finer; /* how many times the study's resolution */
+	enum psr_smooth smooth;
+	unsigned pass;
+} setting[] = {
+	{ "points", 1, PSR_SMOOTH_NONE, 0 },
+	{ "blocks", 1, PSR_SMOOTH_NONE, 0 },
+	{ "blocks, edges", 1, PSR_SMOOTH_EDGES, 0 },
+	{ "blocks, pass 1", 1, PSR_SMOOTH_NONE, 1 },
+	{ "2 times as fine", 2, PSR_SMOOTH_NONE, 0 },
+	{ "4 times as fine", 4, PSR_SMOOTH_NONE, 0 },
+	{ "4 times, pass 1", 4, PSR_SMOOTH_NONE, 1 },
+};
+#define N_SETTINGS ((int)(sizeof setting / sizeof *setting))
+#define N_ROWS (N_SETTINGS + 1)
+#define N_FINER 3 /* 1, 2 and 4 times */
+
+struct subject {
+	struct dpoint_view view;
+	struct psr_model *points, *blocks[N_FINER];
+	int row;
+};
+
+static double *value(const struct subject *s, int i, int column)
+{
+	return study_at(&s->view.study->table, s->row + i, 0, column);
+}
+
+static struct dpoint_way way_of(const struct subject *s, int i)
+{
+	return (struct dpoint_way){ .model = i == 0 ? s->points : s->blocks[setting[i].finer / 2],
+		                        .smooth = setting[i].smooth, .pass = setting[i].pass };
+}
+
+static int measure(struct subject *s)
+{
+	struct dpoint_way way[N_SETTINGS];
+	double fps[N_SETTINGS];
+	int rc;
+
+	for (int i = 0; i < N_SETTINGS; i++)
+		way[i] = way_of(s, i);
+	rc = dpoint_view_time(fps, &s->view, way, N_SETTINGS);
+	for (int i = 0; i < N_SETTINGS && rc == PSR_OK; i++) {
+		struct psr_errors errors;
+
+		rc = dpoint_view_score(&errors, value(s, i, BRIGHT), &s->view, &way[i]);
+		*value(s, i, KB) = (double)psr_model_bytes(way[i].model) / 1e3;
+		*value(s, i, FPS) = fps[i];
+		*value(s, i, DB) = errors.psnr_inside;
+	}
+	return rc;
+}
+
+/* The last row: of the settings of blocks, what is best of those that take no longer than the fastest that takes as long
+ * as points. */
+static void compare(struct subject *s)
+{
+	double least = 0;
+
+	for (int i = 1; i < N_SETTINGS; i++)
+		if (*value(s, i, FPS) <= *value(s, 0, FPS))
+			least = fmax(least, *value(s, i, FPS));
+	for (int column = DB; column <= BRIGHT; column += BRIGHT - DB) {
+		double best = -INFINITY;
+
+		for (int i = 1; i < N_SETTINGS; i++) {
+			*value(s, i, column + 1) = *value(s, 0, column) - *value(s, i, column);
+			if (*value(s, i, FPS) >= least)
+				best = fmax(best, *value(s, i, column));
+		}
+		*value(s, N_SETTINGS, column) = best;
+		*value(s, N_SETTINGS, column + 1) = *value(s, 0, column) - best;
+	}
+	*value(s, N_SETTINGS, FPS) = least;
+}
+
+static int build(struct subject *s, const struct study_model *of)
+{
+	int rc = study_dpoint_of_mesh(&s->points, s->view.study, of);
+
+	for (int i = 0; i < N_FINER && rc == PSR_OK; i++) {
+		struct study finer = *s->view.study;
+
+		finer.resolution <<= i;
+		rc = study_build(&s->blocks[i], NULL, &finer, of);
+		study_step(s->view.study, of->name);
+	}
+	return rc;
+}
+
+static int run_model(struct subject *s, const struct study_model *of)
+{
+	struct study *study = s->view.study;
+	const double pixel = 2.0 / study->resolution, high = DPOINT_VIEW_HEIGHT * pixel;
+	int rc = dpoint_view_open(&s->view, of, high);
+
+	for (int i = 0; i < N_ROWS; i++)
+		study_label(&study->table, s->row + i, "%.20s, %s", of->name, i < N_SETTINGS ? setting[i].name : "equal time");
+	if (rc == PSR_OK)
+		rc = build(s, of);
+	if (rc == PSR_OK)
+		rc = dpoint_view_set(&s->view, high / MAGNIFICATION, 1);
+	if (rc == PSR_OK)
+		rc = measure(s);
+	if (rc == PSR_OK)
+		compare(s);
+	psr_model_unref(s->points);
+	s->points = NULL;
+	for (int i = 0; i < N_FINER; i++) {
+		psr_model_unref(s->blocks[i]);
+		s->blocks[i] = NULL;
+	}
+	s->row += N_ROWS;
+	return rc;
+}
+
+int table_dpoint_equal(struct study *study)
+{
+	const struct study_form form = { "model, way", columns, N_COLUMNS };
+	struct subject s = { .row = 0 };
+	int rc = study_table_init(&study->table, form, study->n_models * N_ROWS, 1, study->err);
+
+	study->total = study->n_models * N_FINER;
+	if (rc == PSR_OK)
+		rc = psr_renderer_create(&study->renderer, study->err);
+	if (rc == PSR_OK)
+		rc = dpoint_view_init(&s.view, study);
+	for (int m = 0; rc == PSR_OK && m < study->n_models; m++)
+		rc = run_model(&s, &study->model[m]);
+	dpoint_view_fini(&s.view);
+	psr_renderer_destroy(study->renderer);
+	return rc;
+}
