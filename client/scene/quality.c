@@ -45,7 +45,7 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		  .words = "draft good fine best",
 		  .help = "draft: coarse and fastest, for finding a view. good: full detail and smooth edges, for pictures that "
 		          "move. fine: four points a pixel, five times as long. best: as smooth as print, for a picture to "
-		          "keep; it takes about a hundred times as long." },
+		          "keep; it takes about sixty times as long." },
 		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &wish->spacing, .arg = "PX", .seen = &wish->has_spacing,
 		  .help = "Detail, instead of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster." },
 		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &wish->is_smooth, .seen = &wish->n_said,
@@ -55,7 +55,7 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		{ .name = "passes", .type = PSR_OPT_INT, .value = &wish->passes, .arg = "N", .max = PSR_MAX_PASS,
 		  .seen = &wish->has_passes,
 		  .help = "Final smoothing, instead of the quality's: 1 draws 4 points a pixel and takes about ten times "
-		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one "
+		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes two to three times as long as the one "
 		          "before." },
 	};
 

@@ -41,13 +41,13 @@ struct refiner {
 	uint32_t linear[256];  /* 16-bit linear light of sRGB */
 };
 
-/* A window's part of the frame: its pixels, and the first sub-pixel of the first one in the window. */
+/* A window's part of the frame: its pixels, the first sub-pixel of the first one in the window, and its size. */
 struct part {
 	const struct refiner *refiner;
 	struct psr_frame *frame;
 	struct wide_light light; /* of sub-pixels */
 	const uint8_t *rgb;      /* instead, of those of a fine picture; else NULL */
-	uint32_t x0, x1, y0, left, top, stride;
+	uint32_t x0, x1, y0, left, top, stride, height;
 	unsigned pass;
 };
 
@@ -130,6 +130,19 @@ static void average_codes(const struct part *part, size_t first, size_t at)
 	}
 }
 
+/* Four points a pixel are few for its mean: those around it tell of it, too (decision 0150). */
+static void average_around(uint16_t *light, const struct part *part, uint32_t row, uint32_t n, uint32_t channel)
+{
+	const uint16_t *root = part->light.channel[channel] + part->left;
+	const uint32_t top = part->top + 2 * row, above = top > 0 ? top - 1 : 0;
+	const uint32_t below = top + 2 < part->height ? top + 2 : top + 1;
+	const uint16_t *const rows[4] = { root + (size_t)above * part->stride, root + (size_t)top * part->stride,
+		                              root + (size_t)(top + 1) * part->stride, root + (size_t)below * part->stride };
+
+	renderer_simd(part->refiner->renderer)->average_around(light, rows, n, part->left == 0,
+	                                                       part->left + 2 * n >= part->stride);
+}
+
 static void average_row(int row, void *userdata)
 {
 	const struct part *part = userdata;
@@ -142,7 +155,10 @@ static void average_row(int row, void *userdata)
 	for (uint32_t x = 0; part->rgb != NULL && x < n; x++)
 		average_codes(part, first + 2 * (size_t)x, at + x);
 	for (uint32_t c = 0; part->rgb == NULL && part->frame->rgb != NULL && c < 3; c++) {
-		simd->average_light(light, part->light.channel[c] + first, part->stride, n, part->pass);
+		if (part->pass == 1)
+			average_around(light, part, (uint32_t)row, n, c);
+		else
+			simd->average_light(light, part->light.channel[c] + first, part->stride, n, part->pass);
 		for (uint32_t x = 0; x < n; x++)
 			part->frame->rgb[3 * (at + x) + c] = part->refiner->srgb[light[x]];
 	}
@@ -193,7 +209,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	const uint32_t from_y = j ? MARGIN : 0, to_y = is_last_y ? window.height : WINDOW_HEIGHT - MARGIN;
 	struct part part = {
 		.refiner = r, .frame = frame, .light = renderer_light(r->renderer), .rgb = fine.rgb, .pass = pass,
-		.stride = window.width, .left = from_x, .top = from_y,
+		.stride = window.width, .height = window.height, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
 	frame_report_add(&frame->report, &fine.report, pass);

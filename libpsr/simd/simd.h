@@ -56,6 +56,7 @@ struct simd {
 	fill_depths_fn *fill_depths;
 	smooth_fn *smooth;
 	average_light_fn *average_light;
+	average_around_fn *average_around;
 	average_depth_fn *average_depth;
 	reproject_depths_fn *reproject_depths;
 	reproject_texels_fn *reproject_texels;

@@ -1,4 +1,4 @@
-/* average_light, average_depth and holes: rows of any width, passes of any number, levels of any kind. */
+/* average_light, average_around, average_depth and holes: rows of any width, passes of any number, levels of any kind. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -28,6 +28,21 @@ static void random_averages(struct check *c)
 	const unsigned pass = 1 + check_below(c, 4);
 
 	average(c, 1 + check_below(c, AVERAGE_MOST >> pass), pass, check_one_in(c, 2));
+}
+
+static void random_around(struct check *c)
+{
+	const uint32_t n = 1 + check_below(c, AVERAGE_MOST / 2), stride = 2 * n + 2;
+	const int is_first = check_one_in(c, 2), is_last = check_one_in(c, 2);
+	uint16_t *root = check_in(c, 4 * (size_t)stride, sizeof *root), *light = check_out(c, n, sizeof *light);
+	const uint16_t *row[4];
+
+	if (check_one_in(c, 3))
+		memset(root, 0xff, 4 * (size_t)stride * sizeof *root);
+	for (int k = 0; k < 4; k++)
+		row[k] = root + (size_t)k * stride + 1 + (k == 0 ? -is_first : k == 3 ? is_last : 0);
+	while (check_next(c))
+		c->simd->average_around(light, row, n, is_first, is_last);
 }
 
 static void holes(struct check *c, uint32_t width, uint32_t x, uint32_t n)
@@ -71,6 +86,7 @@ int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
 		{ "average: random rows and passes", random_averages, 600, NULL },
+		{ "average_around: random rows and borders", random_around, 600, NULL },
 		{ "holes: random rows, levels and borders", random_holes, 1000, NULL },
 		{ "average_light, pass 3", bench_light, 0, "sub-pixel" },
 		{ "holes", bench_holes, 0, "pixel" },

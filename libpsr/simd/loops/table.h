@@ -53,6 +53,7 @@
 	.fill_depths = fill_depths,                    \
 	.smooth = smooth,                              \
 	.average_light = average_light,                \
+	.average_around = average_around,              \
 	.average_depth = average_depth,                \
 	.reproject_depths = reproject_depths,          \
 	.reproject_texels = reproject_texels,          \
