@@ -26,9 +26,11 @@ struct arrival {
 	struct piece piece;
 	uint64_t done;                   /* of the piece */
 	XXH64_state_t *state;
+	enum pack_place place;           /* of the sections that come */
 	uint32_t section;                /* the next one; n_sections: behind the last */
 	uint64_t first;                  /* the next byte of it */
 	uint64_t hash_at, n_octree, octree_left, octree_at; /* hash_at: in `head`, of the next piece's hash or entry */
+	uint64_t octree_entry;           /* in `head` */
 	uint8_t top[TOP_BYTES];
 };
 
@@ -80,7 +82,7 @@ static uint64_t length_of(const struct arrival *a, uint32_t section)
 /* Returns how many bytes the head has, as far as those that are there tell; *is_all: they tell it. */
 static uint64_t head_needs(struct arrival *a, int *is_all)
 {
-	uint64_t n_chunks = 0, at;
+	uint64_t n_chunks = 0, n_behind = 0, at;
 
 	*is_all = 0;
 	if (a->n_head < FILE_HEADER_BYTES)
@@ -92,16 +94,20 @@ static uint64_t head_needs(struct arrival *a, int *is_all)
 	*is_all = a->packing == 0;
 	if (a->packing == 0 || a->n_head < a->table_end)
 		return a->table_end;
-	for (uint32_t i = 0; i < a->n_sections; i++)
-		if (!pack_is_of_octree(a->packing, entry_of(a, i)))
-			n_chunks += length_of(a, i) / FILE_CHUNK_BYTES + (length_of(a, i) % FILE_CHUNK_BYTES != 0);
+	for (uint32_t i = 0; i < a->n_sections; i++) {
+		const uint64_t n = length_of(a, i) / FILE_CHUNK_BYTES + (length_of(a, i) % FILE_CHUNK_BYTES != 0);
+
+		n_chunks += pack_place(a->packing, entry_of(a, i)) == PACK_BEFORE ? n : 0;
+		n_behind += pack_place(a->packing, entry_of(a, i)) == PACK_BEHIND ? n : 0;
+	}
 	at = a->table_end + PACK_ENTRY_BYTES * n_chunks;
-	*is_all = a->packing != PACKING_OCTREE;
+	*is_all = !pack_has_steps(a->packing);
 	if (*is_all || a->n_head < at + PACK_ENTRY_BYTES)
 		return *is_all ? at : at + PACK_ENTRY_BYTES;
 	*is_all = 1;
 	a->n_octree = file_get(a->head + at, 8);
-	return at + PACK_ENTRY_BYTES * (1 + pack_pieces(a->n_octree));
+	a->octree_entry = at;
+	return at + PACK_ENTRY_BYTES * (1 + pack_pieces(a->n_octree) + n_behind);
 }
 
 static int check_header(const struct arrival *a, struct psr_error *err)
@@ -123,9 +129,11 @@ static int check_head(struct arrival *a, struct psr_error *err)
 	a->head_end = a->facts.n_checked = a->n_head;
 	a->facts.n_file = file_get(a->head + (a->packing == 0 ? HEADER_FILE_SIZE : HEADER_PACKED_SIZE), 8);
 	a->facts.hash = file_get(a->head + HEADER_HASH, 8);
-	a->facts.has_steps = a->packing == PACKING_OCTREE;
+	a->facts.has_steps = pack_has_steps(a->packing);
 	a->octree_left = a->n_octree;
-	a->octree_at = a->facts.n_file - a->n_octree;
+	a->octree_at = a->head_end;
+	for (uint64_t at = a->table_end; a->facts.has_steps && at < a->octree_entry; at += PACK_ENTRY_BYTES)
+		a->octree_at += file_get(a->head + at + PACK_LENGTH, 4);
 	a->hash_at = a->packing == 0 ? FILE_HEADER_BYTES + FILE_ENTRY_BYTES * (uint64_t)a->n_sections : a->table_end;
 	return PSR_OK;
 }
@@ -203,7 +211,7 @@ static struct piece next_packed(struct arrival *a)
 {
 	const uint8_t *entry = a->head + a->hash_at;
 
-	while (a->section < a->n_sections && (pack_is_of_octree(a->packing, entry_of(a, a->section)) ||
+	while (a->section < a->n_sections && (pack_place(a->packing, entry_of(a, a->section)) != a->place ||
 	                                      a->first >= length_of(a, a->section))) {
 		a->section++;
 		a->first = 0;
@@ -221,6 +229,10 @@ static struct piece next_packed(struct arrival *a)
 	a->hash_at += PACK_ENTRY_BYTES;
 	const uint64_t n = a->octree_left < PACK_PIECE_BYTES ? a->octree_left : PACK_PIECE_BYTES;
 	a->octree_left -= n;
+	if (a->octree_left == 0) {
+		a->place = PACK_BEHIND;
+		a->section = 0;
+	}
 	return hashed(n, file_get(entry + PACK_HASH, 8));
 }
 
@@ -250,6 +262,8 @@ static int find_steps(struct arrival *a, struct psr_error *err)
 
 		f->step[s].end = a->octree_at + (end < a->n_octree ? end : a->n_octree);
 	}
+	if (n > 0)
+		f->step[n - 1].end = f->n_file; /* with the scan */
 	f->n_steps = n > 0 ? n : 0;
 	return n > 0 ? PSR_OK : n;
 }

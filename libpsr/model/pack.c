@@ -66,12 +66,15 @@ static uint32_t stride_of(const uint8_t *type)
 	return 1;
 }
 
-int pack_is_of_octree(uint64_t packing, const uint8_t *entry)
+enum pack_place pack_place(uint64_t packing, const uint8_t *entry)
 {
-	for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE && packing == PACKING_OCTREE; k++)
+	for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE && pack_has_steps(packing); k++)
 		if (file_is_section(entry, k))
-			return 1;
-	return 0;
+			return PACK_IN_OCTREE;
+	for (int k = SECTION_FIRST_OF_SCAN; k < SECTION_END_OF_SCAN && packing == PACKING_SCAN; k++)
+		if (file_is_section(entry, k))
+			return PACK_BEHIND;
+	return PACK_BEFORE;
 }
 
 int pack_find_octree(struct octree *tree, const uint8_t *image)
@@ -108,7 +111,7 @@ int pack_find_octree(struct octree *tree, const uint8_t *image)
 struct packer {
 	ZSTD_CCtx *context;
 	uint64_t packing;
-	uint8_t *octree; /* packed, in way 3 */
+	uint8_t *octree; /* packed, in ways 3 and 4 */
 	size_t n_octree;
 	uint8_t *split, *packed; /* a chunk, and its largest packed form */
 	size_t packed_capacity;
@@ -172,11 +175,11 @@ static uint64_t directory_end(const struct packer *p, const uint8_t *image, uint
 	for (uint64_t i = 0; i < n_sections; i++) {
 		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 
-		if (!pack_is_of_octree(p->packing, entry))
+		if (pack_place(p->packing, entry) != PACK_IN_OCTREE)
 			n_chunks += pack_chunks(file_get(entry + ENTRY_LENGTH, 8));
 	}
 	*n = n_chunks;
-	if (p->packing == PACKING_OCTREE)
+	if (pack_has_steps(p->packing))
 		n_chunks += 1 + pack_pieces(p->n_octree);
 	return *directory + PACK_ENTRY_BYTES * n_chunks;
 }
@@ -192,41 +195,56 @@ static uint64_t store_chunk(uint8_t *out, uint64_t at, uint8_t *entry, const uin
 	return at + n;
 }
 
-/* Writes directory and chunks, stored from chunk `n_packed` on. Returns the size of the file. */
-static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8_t *image, uint64_t n_packed)
-{
-	uint64_t directory, n_chunks, at = directory_end(p, image, &directory, &n_chunks), n = 0;
-	uint8_t *next = out + directory;
+/* The packed file as it is written. */
+struct packing {
+	const struct packer *p;
+	uint8_t *out, *next; /* the next entry of the directory */
+	uint64_t at;         /* the end of the chunks that are there */
+	uint64_t n, n_packed; /* chunks; from n_packed on they are stored */
+};
 
+/* Writes the chunks of the sections of this place. */
+static void pack_sections(struct packing *to, const uint8_t *image, enum pack_place place)
+{
 	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++) {
 		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
 
-		if (pack_is_of_octree(p->packing, entry))
+		if (pack_place(to->p->packing, entry) != place)
 			continue;
-		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, n++) {
-			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
+		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, to->n++, to->next += PACK_ENTRY_BYTES) {
+			const uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
+			const uint8_t *chunk = image + offset + first;
 
-			if (n < n_packed)
-				at += pack_chunk(p, out + at, next, image + offset + first, size, stride_of(entry + ENTRY_TYPE));
+			if (to->n < to->n_packed)
+				to->at += pack_chunk(to->p, to->out + to->at, to->next, chunk, size, stride_of(entry + ENTRY_TYPE));
 			else
-				at = store_chunk(out, at, next, image + offset + first, size);
-			next += PACK_ENTRY_BYTES;
+				to->at = store_chunk(to->out, to->at, to->next, chunk, size);
 		}
 	}
-	if (p->packing != PACKING_OCTREE)
-		return at;
-	file_put(next, 8, p->n_octree);
-	for (uint64_t first = 0; first < p->n_octree; first += PACK_PIECE_BYTES) {
-		uint64_t size = p->n_octree - first < PACK_PIECE_BYTES ? p->n_octree - first : PACK_PIECE_BYTES;
-
-		next += PACK_ENTRY_BYTES;
-		at = store_chunk(out, at, next, p->octree + first, size);
-	}
-	return at;
 }
 
-/* Steps of a packed octree are coarser models, and these have no scan. */
+/* Writes directory and chunks, stored from chunk `n_packed` on. Returns the size of the file. */
+static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8_t *image, uint64_t n_packed)
+{
+	uint64_t directory, n_chunks;
+	struct packing to = { .p = p, .out = out, .at = directory_end(p, image, &directory, &n_chunks), .n_packed = n_packed };
+
+	to.next = out + directory;
+	pack_sections(&to, image, PACK_BEFORE);
+	if (!pack_has_steps(p->packing))
+		return to.at;
+	file_put(to.next, 8, p->n_octree);
+	to.next += PACK_ENTRY_BYTES;
+	for (uint64_t first = 0; first < p->n_octree; first += PACK_PIECE_BYTES, to.next += PACK_ENTRY_BYTES) {
+		const uint64_t size = p->n_octree - first < PACK_PIECE_BYTES ? p->n_octree - first : PACK_PIECE_BYTES;
+
+		to.at = store_chunk(out, to.at, to.next, p->octree + first, size);
+	}
+	pack_sections(&to, image, PACK_BEHIND);
+	return to.at;
+}
+
 static int has_scan(const uint8_t *image)
 {
 	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++)
@@ -244,14 +262,14 @@ static int pack_octree(struct packer *p, const uint8_t *image, struct psr_error 
 	int code;
 
 	p->packing = PACKING_ZSTD;
-	if (!pack_find_octree(&tree, image) || has_scan(image))
+	if (!pack_find_octree(&tree, image))
 		return PSR_OK;
 	if (tree.n_leaves > OCTREE_CHUNK && (code = psr_pool_create(&pool, psr_pool_all_cores(), err)) != PSR_OK)
 		return code;
 	code = octree_pack(&p->octree, &p->n_octree, &tree, OCTREE_SMALL | OCTREE_STEPS, pool, err);
 	psr_pool_destroy(pool);
 	if (code == PSR_OK)
-		p->packing = PACKING_OCTREE;
+		p->packing = has_scan(image) ? PACKING_SCAN : PACKING_OCTREE;
 	return code;
 }
 
@@ -293,7 +311,7 @@ int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *
 		code = pack_all(&packer, out, n_bytes, capacity, image, n_image);
 	/* An octree that packs too well for the ratio is packed like all else. */
 	if (code == PSR_OK && pack_max_image(*n_bytes) < n_image) {
-		assert(packer.packing == PACKING_OCTREE);
+		assert(pack_has_steps(packer.packing));
 		psr_free_huge(*out, *capacity);
 		packer.packing = PACKING_ZSTD;
 		packer.n_octree = 0;

@@ -9,6 +9,7 @@
 enum { HEADER_PACKING = 28, HEADER_PACKED_SIZE = 48 }; /* zeros in a plain file */
 #define PACKING_ZSTD 1
 #define PACKING_OCTREE 3 /* the same, and the sections of an octree as octree_pack() makes them, in steps */
+#define PACKING_SCAN 4   /* the same, and the scan's sections behind the octree */
 
 /* An entry of the directory. */
 #define PACK_ENTRY_BYTES 16
@@ -52,9 +53,16 @@ static inline int pack_is_stride(uint32_t stride)
 void pack_split(uint8_t *out, const uint8_t *chunk, size_t n_bytes, uint32_t stride, enum pack_method method);
 void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t stride, enum pack_method method);
 
-/* Way 3: behind the directory's entries of other sections are the length of the packed octree and 8 zeros, then an
- * entry for each of its pieces of PACK_PIECE_BYTES, all stored. */
-int pack_is_of_octree(uint64_t packing, const uint8_t *entry); /* of the table */
+/* Ways 3 and 4: behind the directory's entries of other sections are the length of the packed octree and 8 zeros, then
+ * an entry for each of its pieces of PACK_PIECE_BYTES, all stored. In way 4 entries of a scan's chunks follow, as the
+ * chunks follow the octree: a file that ends early has no scan. */
+static inline int pack_has_steps(uint64_t packing)
+{
+	return packing == PACKING_OCTREE || packing == PACKING_SCAN;
+}
+
+enum pack_place { PACK_BEFORE, PACK_IN_OCTREE, PACK_BEHIND };
+enum pack_place pack_place(uint64_t packing, const uint8_t *entry); /* of the table */
 
 /* Finds the octree of an image whose sections are inside of it; arrays point there, and have the lengths that its counts
  * ask for. Returns 0 if it has none, or not so. Nothing else is checked. */

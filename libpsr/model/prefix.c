@@ -26,16 +26,18 @@ static uint64_t least_bytes(const struct unpacker *u, const struct part *part)
 {
 	const uint64_t pieces = pack_pieces(part->step[0].end) * PACK_PIECE_BYTES;
 
-	return u->n_file - u->n_octree + (pieces < u->n_octree ? pieces : u->n_octree);
+	return u->octree_at + (pieces < u->n_octree ? pieces : u->n_octree);
 }
 
 static int read_part(const struct unpacker *u, struct part *part)
 {
-	const uint64_t begin = u->n_file - u->n_octree, end = u->source->n_bytes;
+	const uint64_t begin = u->octree_at, end = u->source->n_bytes;
 	struct psr_error what = { 0 };
 	int code;
 
 	part->n_bytes = end > begin ? (end - begin) / PACK_PIECE_BYTES * PACK_PIECE_BYTES : 0;
+	if (end > begin && end - begin >= u->n_octree) /* it is the scan behind it that is not whole */
+		part->n_bytes = u->n_octree;
 	if (part->n_bytes == 0)
 		return bad(u, "the file ends at byte %" PRIu64 " of %" PRIu64 ", before the first %" PRIu64 " bytes of its "
 		           "octree, from byte %" PRIu64 " on; it was cut short", end, u->n_file,
@@ -100,54 +102,69 @@ static int unpack_part(const struct unpacker *u, struct part *part)
 }
 
 /* Returns the length that a section of the file has with the coarser tree. */
-static uint64_t length_of(const struct unpacker *u, const uint8_t *entry, const struct octree *tree)
+static uint64_t length_of(const uint8_t *entry, const struct octree *tree)
 {
 	const struct content content = { .has_octree = 1, .octree = *tree };
 
-	for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE && pack_is_of_octree(u->packing, entry); k++)
+	for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE; k++)
 		if (file_is_section(entry, k))
 			return section_table[k].item_bytes * section_items(&section_table[k], &content);
 	return file_get(entry + ENTRY_LENGTH, 8);
 }
 
+/* Returns whether the model has a section: all but those behind the octree. */
+static int is_in_part(const struct unpacker *u, uint32_t i)
+{
+	return pack_place(u->packing, unpack_entry(u, i)) != PACK_BEHIND;
+}
+
 /* Makes an image with header and table, without hashes. */
 static int make_table(uint8_t **out, uint64_t *n_image, const struct unpacker *u, const struct octree *tree)
 {
-	uint64_t n_chunks = 0, at;
+	uint64_t n_chunks = 0, n_sections = 0, n_sections_bytes = 0, at;
 	uint8_t *image, *entry;
 
 	for (uint32_t i = 0; i < u->n_sections; i++)
-		n_chunks += file_chunks(length_of(u, unpack_entry(u, i), tree));
-	at = file_align(FILE_HEADER_BYTES + FILE_ENTRY_BYTES * (uint64_t)u->n_sections + 8 * n_chunks);
-	*n_image = at + FILE_TAIL_BYTES;
-	for (uint32_t i = 0; i < u->n_sections; i++)
-		*n_image += file_align(length_of(u, unpack_entry(u, i), tree));
+		if (is_in_part(u, i)) {
+			const uint64_t length = length_of(unpack_entry(u, i), tree);
+
+			n_chunks += file_chunks(length);
+			n_sections_bytes += file_align(length);
+			n_sections++;
+		}
+	at = file_align(FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * n_chunks);
+	*n_image = at + FILE_TAIL_BYTES + n_sections_bytes;
 	if (*n_image > pack_max_image(u->source->n_bytes))
 		return fail_ratio(u, *n_image);
 	image = *out = psr_alloc_huge(*n_image);
 	if (image == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a model of %" PRIu64 " bytes", u->source->name,
 		                *n_image);
-	memcpy(image, u->head, FILE_HEADER_BYTES + FILE_ENTRY_BYTES * (uint64_t)u->n_sections);
+	memcpy(image, u->head, FILE_HEADER_BYTES);
+	file_put(image + HEADER_N_SECTIONS, 4, n_sections);
 	file_put(image + HEADER_FILE_SIZE, 8, *n_image);
 	file_put(image + HEADER_N_CHUNKS, 4, n_chunks);
 	file_put(image + HEADER_PACKING, 4, 0);
 	file_put(image + HEADER_PACKED_SIZE, 8, 0);
 	entry = image + FILE_HEADER_BYTES;
-	for (uint32_t i = 0; i < u->n_sections; i++, entry += FILE_ENTRY_BYTES) {
-		const uint64_t length = length_of(u, unpack_entry(u, i), tree);
+	for (uint32_t i = 0; i < u->n_sections; i++) {
+		const uint64_t length = length_of(unpack_entry(u, i), tree);
 
+		if (!is_in_part(u, i))
+			continue;
+		memcpy(entry, unpack_entry(u, i), FILE_ENTRY_BYTES);
 		file_put(entry + ENTRY_OFFSET, 8, at);
 		file_put(entry + ENTRY_LENGTH, 8, length);
+		entry += FILE_ENTRY_BYTES;
 		at += file_align(length);
 	}
 	return PSR_OK;
 }
 
 /* Returns where a section of this length begins in the image; NULL if there is none. */
-static uint8_t *section_at(const struct unpacker *u, uint8_t *image, int id, uint64_t length)
+static uint8_t *section_at(uint8_t *image, int id, uint64_t length)
 {
-	for (uint32_t i = 0; i < u->n_sections; i++) {
+	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++) {
 		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 
 		if (file_is_section(entry, id) && file_get(entry + ENTRY_LENGTH, 8) == length)
@@ -160,20 +177,20 @@ static uint8_t *section_at(const struct unpacker *u, uint8_t *image, int id, uin
 static int put_tree(const struct unpacker *u, uint8_t *image, const struct octree *tree, int n_missing)
 {
 	const struct content content = { .has_octree = 1, .octree = *tree };
-	uint8_t *const info = section_at(u, image, SECTION_INFO, INFO_BYTES);
+	uint8_t *const info = section_at(image, SECTION_INFO, INFO_BYTES);
 
 	for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const uint64_t length = spec->item_bytes * section_items(spec, &content);
 		const void *array = section_array(spec, &content);
-		uint8_t *to = section_at(u, image, k, length);
+		uint8_t *to = section_at(image, k, length);
 
 		if ((array == NULL) != (to == NULL))
 			return bad(u, "the packed octree and the section table do not agree whether there is a section %s", spec->type);
 		if (to != NULL)
 			memcpy(to, array, length);
 	}
-	file_put_octree(section_at(u, image, SECTION_OCTREE, OCTREE_BYTES), tree);
+	file_put_octree(section_at(image, SECTION_OCTREE, OCTREE_BYTES), tree);
 	if (u->is_octree_alone && info != NULL) {
 		const uint64_t resolution = file_get(info + INFO_RESOLUTION, 4) >> n_missing;
 
@@ -215,16 +232,16 @@ int pack_beginnings(struct pack_beginning *beginning, const struct pack_source *
 	int n = 0;
 
 	if (unpack_fetch(&u, u.header, 0, FILE_HEADER_BYTES) == PSR_OK
-	    && file_get(u.header + HEADER_PACKING, 4) == PACKING_OCTREE && unpack_read_head(&u) == PSR_OK
+	    && pack_has_steps(file_get(u.header + HEADER_PACKING, 4)) && unpack_read_head(&u) == PSR_OK
 	    && unpack_check_head(&u) == PSR_OK && u.n_file == source->n_bytes && u.n_octree > PACK_PIECE_BYTES) {
-		const uint64_t begin = u.n_file - u.n_octree;
+		const uint64_t begin = u.octree_at;
 
 		start.n_bytes = begin + PACK_PIECE_BYTES;
 		u.source = &start;
 		read_part(&u, &part); /* fails where the first step takes more than a piece, and has read the steps */
 		n_rest = u.n_image;
 		for (uint32_t i = 0; i < u.n_sections; i++)
-			if (pack_is_of_octree(u.packing, unpack_entry(&u, i)))
+			if (pack_place(u.packing, unpack_entry(&u, i)) != PACK_BEFORE)
 				n_rest -= file_get(unpack_entry(&u, i) + ENTRY_LENGTH, 8);
 		for (int s = 0; s < part.n_steps - 1; s++) {
 			const struct octree_step *step = &part.step[s], *last = &part.step[part.n_steps - 1];

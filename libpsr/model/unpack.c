@@ -57,14 +57,15 @@ static int read_octree_entry(struct unpacker *u, uint64_t size, uint64_t *n_chun
 
 int unpack_read_head(struct unpacker *u)
 {
-	uint64_t n_chunks = 0, size, packing = file_get(u->header + HEADER_PACKING, 4);
+	uint64_t n_chunks = 0, n_behind = 0, size, packing = file_get(u->header + HEADER_PACKING, 4);
 	int code;
 
 	u->packing = packing;
-	if (packing != PACKING_ZSTD && packing != PACKING_OCTREE)
+	if (packing != PACKING_ZSTD && !pack_has_steps(packing))
 		return psr_fail(u->err, PSR_ERR_VERSION,
-		                "%s: the file is packed in way %" PRIu64 ", and this build knows ways %d and %d; take the psr "
-		                "that packed it, or build it again", u->source->name, packing, PACKING_ZSTD, PACKING_OCTREE);
+		                "%s: the file is packed in way %" PRIu64 ", and this build knows ways %d, %d and %d; take the psr "
+		                "that packed it, or build it again", u->source->name, packing, PACKING_ZSTD, PACKING_OCTREE,
+		                PACKING_SCAN);
 	size = file_get(u->header + HEADER_PACKED_SIZE, 8);
 	u->n_image = file_get(u->header + HEADER_FILE_SIZE, 8);
 	u->n_sections = (uint32_t)file_get(u->header + HEADER_N_SECTIONS, 4);
@@ -72,7 +73,7 @@ int unpack_read_head(struct unpacker *u)
 		return bad(u, "the header lists %" PRIu32 " sections, more than the %d there can be", u->n_sections,
 		           FILE_MAX_SECTIONS);
 	u->n_file = size;
-	if (size > u->source->n_bytes && packing != PACKING_OCTREE)
+	if (size > u->source->n_bytes && !pack_has_steps(packing))
 		return bad(u, "the file ends at byte %" PRIu64 " of %" PRIu64 "; it was cut short", u->source->n_bytes, size);
 	if (size < u->source->n_bytes)
 		return bad(u, "%" PRIu64 " bytes follow the end of the file's last chunk", u->source->n_bytes - size);
@@ -96,11 +97,14 @@ int unpack_read_head(struct unpacker *u)
 
 		if (length > u->n_image)
 			return bad(u, "section %" PRIu32 " has %" PRIu64 " of %" PRIu64 " bytes", i, length, u->n_image);
-		if (!pack_is_of_octree(packing, unpack_entry(u, i)))
+		if (pack_place(packing, unpack_entry(u, i)) == PACK_BEFORE)
 			n_chunks += pack_chunks(length);
+		else if (pack_place(packing, unpack_entry(u, i)) == PACK_BEHIND)
+			n_behind += pack_chunks(length);
 	}
-	if (code == PSR_OK && packing == PACKING_OCTREE)
+	if (code == PSR_OK && pack_has_steps(packing))
 		code = read_octree_entry(u, size, &n_chunks);
+	n_chunks += n_behind;
 	/* At most 256 sections of 64 times the file: no product overflows. */
 	u->head_end = u->table_end + PACK_ENTRY_BYTES * n_chunks;
 	if (code == PSR_OK && u->head_end > size)
@@ -122,10 +126,60 @@ int unpack_read_head(struct unpacker *u)
 	return code;
 }
 
-int unpack_check_head(const struct unpacker *u)
+/* Where a check of the directory is. */
+struct check {
+	const uint8_t *next; /* entry */
+	uint64_t n, file_at; /* the chunk's number and place */
+};
+
+static int check_chunks(const struct unpacker *u, struct check *to, uint64_t length)
 {
-	const uint8_t *next = u->head + u->table_end;
-	uint64_t image_at = file_align(u->table_end), file_at = u->head_end, n = 0;
+	for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, to->next += PACK_ENTRY_BYTES, to->n++) {
+		const uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
+		const uint64_t packed = file_get(to->next + PACK_LENGTH, 4);
+		const int method = to->next[PACK_METHOD];
+
+		if (method >= PACK_N_METHODS || !pack_is_stride(to->next[PACK_STRIDE]) || file_get(to->next + 6, 2) != 0)
+			return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is unknown", to->n,
+			           method, to->next[PACK_STRIDE]);
+		if (method == PACK_STORED ? packed != size : packed >= size || packed == 0)
+			return bad(u, "chunk %" PRIu64 " of %" PRIu64 " bytes is packed into %" PRIu64, to->n, size, packed);
+		to->file_at += packed;
+	}
+	return PSR_OK;
+}
+
+/* Of the sections of this place. */
+static int check_place(const struct unpacker *u, struct check *to, enum pack_place place)
+{
+	int code = PSR_OK;
+
+	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++)
+		if (pack_place(u->packing, unpack_entry(u, i)) == place)
+			code = check_chunks(u, to, file_get(unpack_entry(u, i) + ENTRY_LENGTH, 8));
+	return code;
+}
+
+static int check_octree(const struct unpacker *u, struct check *to)
+{
+	for (uint64_t first = 0; first < u->n_octree; first += PACK_PIECE_BYTES, to->n++) {
+		const uint64_t size = u->n_octree - first < PACK_PIECE_BYTES ? u->n_octree - first : PACK_PIECE_BYTES;
+
+		to->next += PACK_ENTRY_BYTES;
+		if (file_get(to->next, 8) != (size | (uint64_t)PACK_STORED << 32 | (uint64_t)1 << 40))
+			return bad(u, "chunk %" PRIu64 ", of the packed octree, is not one of %" PRIu64 " bytes as they are", to->n,
+			           size);
+		to->file_at += size;
+	}
+	to->next += PACK_ENTRY_BYTES;
+	return PSR_OK;
+}
+
+int unpack_check_head(struct unpacker *u)
+{
+	struct check check = { .next = u->head + u->table_end, .file_at = u->head_end };
+	uint64_t image_at = file_align(u->table_end);
+	int code;
 
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = unpack_entry(u, i);
@@ -134,40 +188,26 @@ int unpack_check_head(const struct unpacker *u)
 		if (offset != image_at)
 			return bad(u, "section %" PRIu32 " begins at byte %" PRIu64 " instead of %" PRIu64, i, offset, image_at);
 		image_at = file_align(image_at + length);
-		if (pack_is_of_octree(u->packing, entry))
-			continue;
-		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
-			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
-			uint64_t packed = file_get(next + PACK_LENGTH, 4);
-
-			if (next[PACK_METHOD] >= PACK_N_METHODS || !pack_is_stride(next[PACK_STRIDE])
-			    || file_get(next + 6, 2) != 0)
-				return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is unknown", n,
-				           next[PACK_METHOD], next[PACK_STRIDE]);
-			if (next[PACK_METHOD] == PACK_STORED ? packed != size : packed >= size || packed == 0)
-				return bad(u, "chunk %" PRIu64 " of %" PRIu64 " bytes is packed into %" PRIu64, n, size, packed);
-			file_at += packed;
-		}
 	}
-	for (uint64_t first = 0; first < u->n_octree; first += PACK_PIECE_BYTES, n++) {
-		const uint64_t size = u->n_octree - first < PACK_PIECE_BYTES ? u->n_octree - first : PACK_PIECE_BYTES;
-
-		next += PACK_ENTRY_BYTES;
-		if (file_get(next, 8) != (size | (uint64_t)PACK_STORED << 32 | (uint64_t)1 << 40))
-			return bad(u, "chunk %" PRIu64 ", of the packed octree, is not one of %" PRIu64 " bytes as they are", n, size);
-		file_at += size;
-	}
+	code = check_place(u, &check, PACK_BEFORE);
+	u->octree_at = check.file_at;
+	if (code == PSR_OK && pack_has_steps(u->packing))
+		code = check_octree(u, &check);
+	if (code == PSR_OK)
+		code = check_place(u, &check, PACK_BEHIND);
+	if (code != PSR_OK)
+		return code;
 	if (image_at + FILE_TAIL_BYTES != u->n_image)
 		return bad(u, "the header says %" PRIu64 " bytes, and the sections have %" PRIu64, u->n_image,
 		           image_at + FILE_TAIL_BYTES);
-	if (file_at != u->n_file)
-		return bad(u, "the chunks end at byte %" PRIu64 ", and the file at byte %" PRIu64, file_at, u->n_file);
+	if (check.file_at != u->n_file)
+		return bad(u, "the chunks end at byte %" PRIu64 ", and the file at byte %" PRIu64, check.file_at, u->n_file);
 	return PSR_OK;
 }
 
 void pack_seal(uint8_t *bytes, size_t n_bytes)
 {
-	uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4), n_chunks = 0, at, head_end, table_end;
+	uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4), n_chunks = 0, n_behind = 0, at, head_end, table_end;
 	uint64_t octree = UINT64_MAX; /* its entry */
 	const uint64_t packing = file_get(bytes + HEADER_PACKING, 4);
 
@@ -175,16 +215,18 @@ void pack_seal(uint8_t *bytes, size_t n_bytes)
 	if (n_sections > FILE_MAX_SECTIONS || table_end > n_bytes)
 		return;
 	for (uint64_t i = 0; i < n_sections; i++) {
-		uint64_t length = file_get(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8);
+		const uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+		const uint64_t length = file_get(entry + ENTRY_LENGTH, 8);
+		const uint64_t n = length / FILE_CHUNK_BYTES + (length % FILE_CHUNK_BYTES != 0);
 
-		if (!pack_is_of_octree(packing, bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i))
-			n_chunks += length / FILE_CHUNK_BYTES + (length % FILE_CHUNK_BYTES != 0);
+		n_chunks += pack_place(packing, entry) == PACK_BEFORE ? n : 0;
+		n_behind += pack_place(packing, entry) == PACK_BEHIND ? n : 0;
 	}
-	if (packing == PACKING_OCTREE) {
+	if (pack_has_steps(packing)) {
 		octree = n_chunks++;
 		if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
 			return;
-		n_chunks += pack_pieces(file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8));
+		n_chunks += pack_pieces(file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8)) + n_behind;
 	}
 	if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
 		return;

@@ -56,20 +56,27 @@ static uint8_t *counts_place(struct counts *counts, const uint8_t *entry)
 	return NULL;
 }
 
-/* Unpacks all chunks into the image, where its table says; or, if that is NULL, the counts alone. */
-static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts *counts)
+/* Unpacks the chunks of this place into the image, where its table says; or, if that is NULL, the counts alone. */
+static int unpack_place(const struct unpacker *u, uint8_t *image, struct counts *counts, enum pack_place of)
 {
-	const uint8_t *next = u->head + u->table_end;
-	uint64_t at = u->head_end, n = 0;
+	const uint64_t n_pieces = pack_pieces(u->n_octree);
+	const int is_behind = of == PACK_BEHIND;
+	const uint8_t *next = u->head + (is_behind ? u->octree_entry + PACK_ENTRY_BYTES * (1 + n_pieces) : u->table_end);
+	uint64_t at = is_behind ? u->octree_at + u->n_octree : u->head_end;
+	uint64_t n = is_behind ? (u->octree_entry - u->table_end) / PACK_ENTRY_BYTES + n_pieces : 0;
+	const uint8_t *to_entry = image != NULL ? image + FILE_HEADER_BYTES : NULL;
 
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = unpack_entry(u, i);
+		const enum pack_place place = pack_place(u->packing, entry);
 		uint64_t length = file_get(entry + ENTRY_LENGTH, 8), offset = 0;
 
-		if (pack_is_of_octree(u->packing, entry))
+		if (image != NULL && !(unpack_is_part(u) && place == PACK_BEHIND)) {
+			offset = file_get(to_entry + ENTRY_OFFSET, 8);
+			to_entry += FILE_ENTRY_BYTES;
+		}
+		if (place != of)
 			continue;
-		if (image != NULL)
-			offset = file_get(image + (entry - u->head) + ENTRY_OFFSET, 8);
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint8_t *to = image != NULL ? image + offset + first : counts_place(counts, entry);
@@ -83,14 +90,22 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts
 	return PSR_OK;
 }
 
+static int read_counts(const struct unpacker *u, struct counts *counts)
+{
+	return unpack_place(u, NULL, counts, PACK_BEFORE);
+}
+
 int unpack_sections(const struct unpacker *u, uint8_t *image)
 {
-	return unpack_chunks(u, image, NULL);
+	const int code = unpack_place(u, image, NULL, PACK_BEFORE);
+
+	return code == PSR_OK && u->packing == PACKING_SCAN && !unpack_is_part(u) ? unpack_place(u, image, NULL, PACK_BEHIND)
+	                                                                          : code;
 }
 
 int unpack_read_octree(const struct unpacker *u, uint8_t *bytes, uint64_t n)
 {
-	const uint64_t file_at = u->n_file - u->n_octree;
+	const uint64_t file_at = u->octree_at;
 	const uint8_t *entry = u->head + u->octree_entry;
 	int code = PSR_OK;
 
@@ -109,7 +124,7 @@ static int check_lengths(struct unpacker *u)
 {
 	struct counts counts = { .has_blocks = 0 };
 	struct content content = { .has_blocks = 0 };
-	int code = unpack_chunks(u, NULL, &counts);
+	int code = read_counts(u, &counts);
 
 	content.has_blocks = counts.has_blocks;
 	content.has_octree = counts.has_octree;
@@ -147,7 +162,7 @@ static int check_lengths(struct unpacker *u)
 	return code;
 }
 
-/* Reads the packed octree and unpacks it into its sections. Chunks before it are in the image. */
+/* Reads the packed octree and unpacks it into its sections. All other chunks are in the image. */
 static int unpack_octree(struct unpacker *u, uint8_t *image, struct octree_shares *shares)
 {
 	struct psr_error what = { 0 };
@@ -187,8 +202,8 @@ static int make_image(struct unpacker *u, uint8_t **out, struct octree_shares *s
 	file_put(image + HEADER_PACKING, 4, 0);
 	file_put(image + HEADER_PACKED_SIZE, 8, 0);
 	file_put(image + HEADER_HASH, 8, file_header_hash(image, u->table_end));
-	code = unpack_chunks(u, image, NULL);
-	if (code == PSR_OK && u->packing == PACKING_OCTREE)
+	code = unpack_sections(u, image);
+	if (code == PSR_OK && pack_has_steps(u->packing))
 		code = unpack_octree(u, image, shares);
 	if (code != PSR_OK) {
 		psr_free_huge(image, u->n_image);
@@ -234,7 +249,7 @@ int pack_read_octree(uint8_t octree[OCTREE_BYTES], const struct pack_source *sou
 	int code = unpacker_init(&u, source, NULL);
 
 	if (code == PSR_OK)
-		code = unpack_chunks(&u, NULL, &counts);
+		code = read_counts(&u, &counts);
 	unpacker_fini(&u);
 	memcpy(octree, counts.octree, OCTREE_BYTES);
 	return code == PSR_OK && counts.has_octree;
@@ -250,7 +265,7 @@ int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const 
 	if (code == PSR_OK)
 		code = check_lengths(&u);
 	if (code == PSR_OK)
-		code = u.n_file > source->n_bytes ? unpack_prefix(&u, image, facts) : make_image(&u, image, &facts->shares);
+		code = unpack_is_part(&u) ? unpack_prefix(&u, image, facts) : make_image(&u, image, &facts->shares);
 	if (code == PSR_OK)
 		*n_image = u.n_image;
 	unpacker_fini(&u);

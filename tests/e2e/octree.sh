@@ -36,6 +36,11 @@ is "with --scan it keeps the classes of the cloud, and no stream of zeros" \
 psr-model build "$work/ball.las" --representation octree --levels 7 --scan --pack -q -o "$work/scan.psr"
 is "and so it does packed" "$(value "$work/scan.json" content_id)" \
 	"$(psr-model info "$work/scan.psr" --json >"$work/scan.json"; value "$work/scan.json" content_id)"
+# The scan is behind the octree: its first byte is in the last third of the file, and the levels before it are there.
+head -c $(($(stat -c %s "$work/scan.psr") * 2 / 3)) "$work/scan.psr" >"$work/part.psr"
+psr-model info "$work/part.psr" --json >"$work/scan.json"
+is "a part of it is a coarser model, without classes" "5 7 {}" \
+	"$(value "$work/scan.json" prefix.levels) $(value "$work/scan.json" prefix.of_levels) $(value "$work/scan.json" octree.scan 2>/dev/null || echo '{}')"
 refuses "a scan of blocks" 2 "add --representation octree" psr-model build "$work/ball.las" \
 	--representation blocks --scan -o "$work/none.psr"
 

@@ -289,7 +289,7 @@ static void lies_are_refused_even_under_right_hashes(void **state)
 		int code;
 		const char *text;
 	} lies[] = {
-		{ NULL, 0, HEADER_PACKING, 4, 2, PSR_ERR_VERSION, "packed in way 2, and this build knows ways 1 and 3" },
+		{ NULL, 0, HEADER_PACKING, 4, 2, PSR_ERR_VERSION, "packed in way 2, and this build knows ways 1, 3 and 4" },
 		{ NULL, 0, HEADER_PACKING, 4, 3, PSR_ERR_FORMAT, "the packed octree has" },
 		{ NULL, 0, HEADER_PACKED_SIZE, 8, 100, PSR_ERR_FORMAT, "bytes follow the end of the file's last chunk" },
 		{ NULL, 0, HEADER_PACKED_SIZE, 8, UINT64_MAX, PSR_ERR_FORMAT, "cut short" },

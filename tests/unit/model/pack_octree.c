@@ -94,7 +94,7 @@ static void it_unpacks_to_the_plain_file(void **state)
 	}
 }
 
-/* Of 2^20 leaves, threads unpack several chunks, and of 2^20 bytes there are several pieces. */
+/* Of 2^20 leaves, threads unpack several chunks, and of 2^20 bytes there are several pieces; of classes two chunks. */
 static void many_chunks_and_pieces_come_back_with_threads(void **state)
 {
 	struct leaves leaves = leaves_at_random(8, 1300000);
@@ -106,6 +106,10 @@ static void many_chunks_and_pieces_come_back_with_threads(void **state)
 	(void)state;
 	free(leaves.path);
 	assert_true(large != NULL && large->n_leaves > OCTREE_CHUNK);
+	large->scan.class = malloc(large->n_leaves);
+	assert_non_null(large->scan.class);
+	for (uint64_t i = 0; i < large->n_leaves; i++)
+		large->scan.class[i] = (uint8_t)(i >> 16);
 	assert_int_equal(psr_model_create_octree(&model, &fixture.info, large, NULL, NULL), PSR_OK);
 	octree_destroy(large);
 	bytes = pack(model, &n);
@@ -190,7 +194,7 @@ static uint8_t *octree_of(uint8_t *bytes)
 	for (uint64_t i = 0; i < n_sections; i++) {
 		const uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 
-		if (!pack_is_of_octree(PACKING_OCTREE, entry))
+		if (pack_place(PACKING_OCTREE, entry) == PACK_BEFORE)
 			n += pack_chunks(file_get(entry + ENTRY_LENGTH, 8));
 	}
 	return bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4)

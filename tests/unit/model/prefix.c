@@ -15,34 +15,50 @@
 #define LEVELS 7
 
 static struct fixture fixture;
-static struct psr_model *models[2]; /* of an octree, and of both */
-static uint8_t *packed[2];
-static size_t n_packed[2];
-static uint64_t octree_at[2];       /* where the packed octree begins */
+enum { OCTREE, BOTH, SCAN, N_MODELS };
+static struct psr_model *models[N_MODELS]; /* of an octree, of blocks beside it, and of an octree with a scan */
+static uint8_t *packed[N_MODELS];
+static size_t n_packed[N_MODELS];
+static uint64_t octree_at[N_MODELS]; /* where the packed octree begins */
 static struct octree_step step[OCTREE_MOST_STEPS];
 static int n_steps;
-static struct octree *coarser[OCTREE_MOST_STEPS]; /* the trees of the steps but the last */
+static struct octree *coarser[OCTREE_MOST_STEPS]; /* the trees of the steps */
 
-static uint64_t octree_bytes(const uint8_t *bytes)
+/* Returns where the packed octree begins: behind the directory, and the chunks before it. */
+static uint64_t octree_begin(const uint8_t *bytes)
 {
-	const uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4);
-	uint64_t n = 0;
+	const uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4), packing = file_get(bytes + HEADER_PACKING, 4);
+	const uint64_t directory = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4);
+	uint64_t n = 0, n_behind = 0, at;
 
 	for (uint64_t i = 0; i < n_sections; i++) {
 		const uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 
-		if (!pack_is_of_octree(PACKING_OCTREE, entry))
-			n += pack_chunks(file_get(entry + ENTRY_LENGTH, 8));
+		n += pack_place(packing, entry) == PACK_BEFORE ? pack_chunks(file_get(entry + ENTRY_LENGTH, 8)) : 0;
+		n_behind += pack_place(packing, entry) == PACK_BEHIND ? pack_chunks(file_get(entry + ENTRY_LENGTH, 8)) : 0;
 	}
-	return file_get(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4)
-	                + PACK_ENTRY_BYTES * n, 8);
+	at = directory + PACK_ENTRY_BYTES * (n + 1 + pack_pieces(file_get(bytes + directory + PACK_ENTRY_BYTES * n, 8)) + n_behind);
+	for (uint64_t i = 0; i < n; i++)
+		at += file_get(bytes + directory + PACK_ENTRY_BYTES * i + PACK_LENGTH, 4);
+	return at;
+}
+
+static void add_scan(struct octree *tree)
+{
+	tree->scan.intensity = malloc(tree->n_leaves * sizeof *tree->scan.intensity);
+	tree->scan.class = malloc(tree->n_leaves);
+	assert_true(tree->scan.intensity != NULL && tree->scan.class != NULL);
+	for (uint64_t i = 0; i < tree->n_leaves; i++) {
+		tree->scan.intensity[i] = (uint16_t)(i * 7919);
+		tree->scan.class[i] = (uint8_t)(i % 7);
+	}
 }
 
 static int setup(void **state)
 {
 	struct leaves leaves = leaves_of_sphere(LEVELS);
 	struct octree *tree = leaves_to_tree(&leaves, LEVELS);
-	const struct octree *at = tree;
+	struct octree *at = tree;
 
 	(void)state;
 	free(leaves.path);
@@ -52,7 +68,9 @@ static int setup(void **state)
 	tree->is_cloud = 1;
 	assert_int_equal(psr_model_create_octree(&models[0], &fixture.info, tree, &fixture.presets, NULL), PSR_OK);
 	assert_int_equal(psr_model_create_both(&models[1], &fixture.info, &fixture.blocks, tree, NULL, NULL), PSR_OK);
-	for (int i = 0; i < 2; i++) {
+	add_scan(tree);
+	assert_int_equal(psr_model_create_octree(&models[SCAN], &fixture.info, tree, &fixture.presets, NULL), PSR_OK);
+	for (int i = 0; i < N_MODELS; i++) {
 		size_t n_image, capacity;
 		const uint8_t *image = model_image(models[i], &n_image);
 		uint8_t *bytes;
@@ -61,24 +79,24 @@ static int setup(void **state)
 		packed[i] = malloc(n_packed[i]);
 		memcpy(packed[i], bytes, n_packed[i]);
 		psr_free_huge(bytes, capacity);
-		octree_at[i] = n_packed[i] - octree_bytes(packed[i]);
+		octree_at[i] = octree_begin(packed[i]);
 	}
 	n_steps = octree_packed_steps(step, packed[0] + octree_at[0], n_packed[0] - octree_at[0], NULL);
 	assert_true(n_steps >= 2 && step[n_steps - 1].end > 2 * PACK_PIECE_BYTES);
+	coarser[n_steps - 1] = tree;
 	for (int s = n_steps - 2; s >= 0; s--) {
 		struct octree *between = octree_coarser(at);
 
 		at = coarser[s] = octree_coarser(between);
 		octree_destroy(between);
 	}
-	octree_destroy(tree);
 	return 0;
 }
 
 static int teardown(void **state)
 {
 	(void)state;
-	for (int i = 0; i < 2; i++) {
+	for (int i = 0; i < N_MODELS; i++) {
 		psr_model_unref(models[i]);
 		free(packed[i]);
 	}
@@ -107,7 +125,7 @@ static int steps_in(size_t n, int model)
 	const uint64_t there = n > octree_at[model] ? n - octree_at[model] : 0;
 	int s = 0;
 
-	while (s < n_steps && step[s].end <= (n < n_packed[model] ? there / PACK_PIECE_BYTES * PACK_PIECE_BYTES : there))
+	while (s < n_steps && step[s].end <= (there < step[n_steps - 1].end ? there / PACK_PIECE_BYTES * PACK_PIECE_BYTES : there))
 		s++;
 	return s;
 }
@@ -115,7 +133,7 @@ static int steps_in(size_t n, int model)
 static void a_file_cut_at_any_length_is_its_coarser_model_or_refused(void **state)
 {
 	(void)state;
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < N_MODELS; i++)
 		for (size_t n = 1; n < n_packed[i]; n += n < 200 || (n + 2) % PACK_PIECE_BYTES < octree_at[i] % 7 + 4 ? 1 : 4999) {
 			struct psr_error err = { .text = "" };
 			struct psr_model_prefix prefix;
@@ -132,6 +150,7 @@ static void a_file_cut_at_any_length_is_its_coarser_model_or_refused(void **stat
 			assert_int_equal(prefix.of_levels, LEVELS);
 			assert_int_equal(prefix.of_bytes, n_packed[i]);
 			assert_tree(psr_model_octree(model), coarser[n_whole - 1]);
+			assert_null(psr_model_octree(model)->scan.intensity);
 			psr_model_unref(model);
 		}
 }
@@ -139,7 +158,7 @@ static void a_file_cut_at_any_length_is_its_coarser_model_or_refused(void **stat
 static void its_model_is_that_of_the_coarser_tree(void **state)
 {
 	(void)state;
-	for (int i = 0; i < 2; i++) {
+	for (int i = 0; i < N_MODELS; i++) {
 		const size_t n = octree_at[i] + pack_pieces(step[n_steps - 2].end) * PACK_PIECE_BYTES;
 		struct psr_model_info info = fixture.info;
 		struct psr_model *model, *made;
@@ -150,21 +169,43 @@ static void its_model_is_that_of_the_coarser_tree(void **state)
 
 		assert_true(n < n_packed[i]);
 		assert_int_equal(parse_exact(&model, packed[i], n, NULL), PSR_OK);
-		if (i == 0) {
+		if (i != BOTH) {
 			info.spacing *= 1 << missing;
 			info.resolution = info.resolution >> missing > 0 ? info.resolution >> missing : 1;
 		}
-		assert_int_equal(psr_model_create_both(&made, &info, i == 1 ? &fixture.blocks : NULL, &tree,
-		                                       i == 0 ? &fixture.presets : NULL, NULL), PSR_OK);
+		assert_int_equal(psr_model_create_both(&made, &info, i == BOTH ? &fixture.blocks : NULL, &tree,
+		                                       i != BOTH ? &fixture.presets : NULL, NULL), PSR_OK);
 		psr_model_content_id(model, id);
 		psr_model_content_id(made, other);
 		assert_memory_equal(id, other, sizeof id);
 		assert_false(psr_model_is_prefix(made, &prefix));
-		assert_int_equal(psr_model_blocks(model) != NULL, i == 1);
+		assert_int_equal(psr_model_blocks(model) != NULL, i == BOTH);
 		psr_model_unref(model);
 		psr_model_unref(made);
 		assert_int_equal(parse_exact(&model, packed[i], n_packed[i], NULL), PSR_OK);
 		assert_false(psr_model_is_prefix(model, &prefix));
+		assert_int_equal(psr_model_octree(model)->scan.class != NULL, i == SCAN);
+		psr_model_unref(model);
+	}
+}
+
+/* What is behind the octree is not missed by a model of all of its levels. */
+static void a_file_that_ends_within_its_scan_has_all_levels(void **state)
+{
+	const size_t end = octree_at[SCAN] + step[n_steps - 1].end;
+	struct psr_model_prefix prefix;
+	struct psr_model *model;
+	uint8_t id[16], other[16];
+
+	(void)state;
+	assert_true(end < n_packed[SCAN]);
+	psr_model_content_id(models[OCTREE], other);
+	for (size_t n = end; n < n_packed[SCAN]; n += 1 + (n_packed[SCAN] - end) / 7) {
+		assert_int_equal(parse_exact(&model, packed[SCAN], n, NULL), PSR_OK);
+		assert_true(psr_model_is_prefix(model, &prefix));
+		assert_int_equal(prefix.levels, LEVELS);
+		psr_model_content_id(model, id);
+		assert_memory_equal(id, other, sizeof id);
 		psr_model_unref(model);
 	}
 }
@@ -370,6 +411,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_file_cut_at_any_length_is_its_coarser_model_or_refused),
 		cmocka_unit_test(its_model_is_that_of_the_coarser_tree),
+		cmocka_unit_test(a_file_that_ends_within_its_scan_has_all_levels),
 		cmocka_unit_test(a_cut_file_on_disk_needs_no_more_memory_than_it_says),
 		cmocka_unit_test(the_shortest_beginning_of_enough_levels_is_read),
 		cmocka_unit_test(beginnings_are_the_steps_but_the_last),
