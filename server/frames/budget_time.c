@@ -71,7 +71,7 @@ static double rate_of(const struct budget_learnt *learnt, int kind)
 		int kind;
 		double times;
 	} sibling[BUDGET_N_WORK] = {
-		[BUDGET_SPLATS] = { BUDGET_SAMPLES, 25 }, [BUDGET_SUBPIXELS] = { BUDGET_PIXELS, 1.5 },
+		[BUDGET_SPLATS] = { BUDGET_SAMPLES, 70 }, [BUDGET_SUBPIXELS] = { BUDGET_PIXELS, 1.5 },
 		[BUDGET_SMOOTH] = { BUDGET_PIXELS, 0.5 },
 	};
 	const struct budget_rate *rate = &learnt->rate[kind];
@@ -169,7 +169,7 @@ double budget_foresee(const struct budget_learnt *learnt, const struct budget_vi
 
 void budget_init(struct budget_learnt *learnt)
 {
-	static const double ns[BUDGET_N_WORK] = { 10, 80, 30, 250, 120, 30, 0 }; /* of one slow core */
+	static const double ns[BUDGET_N_WORK] = { 10, 80, 30, 700, 120, 30, 0 }; /* of one slow core */
 
 	memset(learnt, 0, sizeof *learnt);
 	for (int kind = 0; kind < BUDGET_N_WORK; kind++)
