@@ -14,12 +14,16 @@ static int check_tint(const struct psr_instance *instance, unsigned i, struct ps
 	const struct psr_cubes *cubes = instance_cubes(instance);
 	const struct psr_scan *scan = cubes != NULL ? &cubes->scan : &none;
 	const enum psr_color_by by = instance->color_by;
+	struct psr_model_prefix prefix;
 
 	if ((unsigned)by > PSR_COLOR_RETURN)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: there are no colours %d", i, by);
 	if (by == PSR_COLOR_OWN || by == PSR_COLOR_HEIGHT || (by == PSR_COLOR_INTENSITY && scan->has_intensity)
 	    || (by == PSR_COLOR_CLASS && scan->has_class) || (by == PSR_COLOR_RETURN && scan->has_return))
 		return PSR_OK;
+	if (cubes != NULL && psr_model_is_prefix(instance->model, &prefix))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: %s of a scan stand behind all levels of a packed octree, and "
+		                "these are %u of %u; ask for all of them", i, names[by], prefix.levels, prefix.of_levels);
 	return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: its %s no %s of a scan; an octree has them that psr-model "
 	                "build --scan made of a LAS file that tells them. Any model can be coloured by height", i,
 	                cubes != NULL ? "octree keeps" : "representation has", names[by]);

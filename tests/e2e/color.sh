@@ -23,8 +23,12 @@ for by in intensity class height return; do
 	plain=$(hashes --model plain --color-by $by)
 	echo "$plain" >>"$work/hashes"
 	is "packed, the same bits by $by" "$plain" "$(hashes --model packed --color-by $by)"
-	is "and so where a beginning is asked for, of which there is none" "$plain" \
-		"$(hashes --model packed --level 5 --color-by $by)"
+	if [ $by = height ]; then
+		check "a beginning by height" shot --model packed --level 5 --color-by $by -o "$work/begun.ppm"
+	else
+		is "a beginning has no $by, and says where it is" "of a scan stand behind all levels of a packed octree" \
+			"$(shot --model packed --level 5 --color-by $by -o "$work/begun.ppm" 2>&1 | grep -o 'of a scan.*octree')"
+	fi
 	check "a LAS file as it comes, by $by" shot --model ball --color-by $by --no-legend -o "$work/las_$by.ppm"
 done
 check "these are four pictures, and none in the model's own colours" \

@@ -161,13 +161,16 @@ static uint32_t find_inside(struct closed *c)
 
 /* Finds how many pixels from its middle a pixel may rightly depend on the background. Samples a pixel apart know of an
  * edge where it is to half a pixel. Cells of pass 0 are one to two samples wide, and a pixel fades over four of them,
- * as far as one and a half cells away; those of up to INSIDE pixels have faded out where pixels are looked at. */
+ * as far as one and a half cells away; those of up to INSIDE pixels have faded out where pixels are looked at. A pixel
+ * of pass 1 counts the sub-pixels around it, too, half a pixel further (decision 0150). */
 static double find_reach(const struct closed *c, const struct view *view, unsigned pass, size_t at)
 {
 	const double apart = c->spacing / (view->pixel * c->depth[at]), cell = 2 * apart;
+	const double around = pass == 1 ? 0.5 : 0;
+
 	if (cell <= INSIDE)
-		return 1;
-	return pass == 0 ? 1.5 * cell : 0.5 + apart / 2;
+		return 1 + around;
+	return pass == 0 ? 1.5 * cell : 0.5 + apart / 2 + around;
 }
 
 /* Whether all rays within `reach` pixels of a pixel's middle, along x and y, are stopped by the source. */
@@ -202,6 +205,16 @@ static int is_veiled(const struct closed *c, int x, int y, int reach)
 	return 0;
 }
 
+/* Whether a pixel is to be closed. In pass 1 it has sub-pixels of the eight around it, too. */
+static int is_looked_at(const struct closed *c, unsigned pass, size_t at)
+{
+	const size_t up = at - c->side, down = at + c->side;
+	const uint8_t *in = c->is_inside;
+
+	return in[at] && (pass != 1 || (in[up - 1] & in[up] & in[up + 1] & in[at - 1] & in[at + 1] & in[down - 1] & in[down] &
+	                                in[down + 1]));
+}
+
 static uint32_t look(struct closed *c, unsigned pass, const struct view *view, int number)
 {
 	uint32_t n_dependent = 0, n_veiled = 0, n_torn = 0;
@@ -209,7 +222,7 @@ static uint32_t look(struct closed *c, unsigned pass, const struct view *view, i
 	for (uint32_t y = 0; y < c->side; y++)
 		for (uint32_t x = 0; x < c->side; x++) {
 			const size_t at = (size_t)y * c->side + x;
-			if (!c->is_inside[at] || is_same(&c->frame[0], &c->frame[1], at))
+			if (!is_looked_at(c, pass, at) || is_same(&c->frame[0], &c->frame[1], at))
 				continue;
 			n_dependent++;
 			const double reach = find_reach(c, view, pass, at);
