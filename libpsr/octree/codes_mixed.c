@@ -12,6 +12,8 @@
 #define WEIGHT_SETS 64
 #define LEARN 10       /* of weights */
 
+#define ALWAYS static inline __attribute__((always_inline))
+
 struct model {
 	/* Probabilities of 22 bits above counts of 10. */
 	uint32_t a[1 << A_BITS], b[1 << B_BITS], c[1 << C_BITS], d[1 << D_BITS], e[1 << E_BITS];
@@ -21,8 +23,6 @@ struct model {
 	uint32_t part[COUNTS + 1]; /* 1 / (count + 1.5), in 65536ths */
 	/* A node's neighbourhood is a cube of 4x4x4 children, bit x + 4 y + 16 z: its own are in the middle. */
 	uint64_t spread[256];      /* a code's bits at 0 and 1 of each axis */
-	uint8_t side[OCTREE_NEAR], turn[OCTREE_NEAR]; /* of a neighbour: the octants that touch; how far up to shift */
-	uint8_t touch[8][7];       /* of an octant: the neighbours of its parent that it touches, faces first */
 };
 
 /* exp(-x / 256) in units of 2^-30, x 0..2048, by repeated multiplication with exp(-1/256) = 1069556082 * 2^-30. */
@@ -54,29 +54,39 @@ static void make_places(struct model *model)
 			if (code >> j & 1)
 				model->spread[code] |= (uint64_t)1 << ((j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2));
 	}
-	for (int k = 0; k < OCTREE_NEAR; k++) {
-		const int step[3] = { k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1 };
-		int turn = 21;
+}
 
-		model->side[k] = 0;
-		for (int j = 0; j < 8; j++) {
-			int touches = 1;
+/* What follows is of a constant neighbour or octant, in loops that the compiler unrolls. */
+ALWAYS int step_of(unsigned k, int axis)
+{
+	return (int)(axis == 0 ? k % 3 : axis == 1 ? k / 3 % 3 : k / 9) - 1;
+}
 
-			for (int c = 0; c < 3; c++)
-				touches &= step[c] == 0 || step[c] == ((j >> c & 1) ? -1 : 1);
-			model->side[k] |= (uint8_t)(touches << j);
-		}
-		for (int c = 0, width = 1; c < 3; c++, width *= 4)
-			turn += 2 * width * step[c];
-		model->turn[k] = (uint8_t)(turn & 63);
-	}
-	for (int j = 0; j < 8; j++) {
-		const int x = (j & 1) ? 1 : -1, y = (j & 2) ? 3 : -3, z = (j & 4) ? 9 : -9;
-		const int to[7] = { x, y, z, x + y, y + z, z + x, x + y + z };
+/* The octants of neighbour k that touch the node. */
+ALWAYS unsigned side_of(unsigned k)
+{
+	const int x = step_of(k, 0), y = step_of(k, 1), z = step_of(k, 2);
 
-		for (int i = 0; i < 7; i++)
-			model->touch[j][i] = (uint8_t)(OCTREE_SELF + to[i]);
-	}
+	return (x < 0 ? 0xaau : x > 0 ? 0x55u : 0xffu) & (y < 0 ? 0xccu : y > 0 ? 0x33u : 0xffu) &
+	       (z < 0 ? 0xf0u : z > 0 ? 0x0fu : 0xffu);
+}
+
+/* Where neighbour k's children are in the node's neighbourhood; bits that leave it do not touch. */
+ALWAYS uint64_t shift_to(uint64_t spread, unsigned k)
+{
+	const int up = 21 + 2 * (step_of(k, 0) + 4 * step_of(k, 1) + 16 * step_of(k, 2));
+
+	return up >= 0 ? spread << up : spread >> -up;
+}
+
+/* Which neighbours of its parent octant j touches, faces first. */
+ALWAYS uint32_t touched_by(unsigned j, uint32_t there)
+{
+	const int x = OCTREE_SELF + ((j & 1) ? 1 : -1), y = (j & 2) ? 3 : -3, z = (j & 4) ? 9 : -9;
+
+	return (there >> x & 1) | (there >> (OCTREE_SELF + y) & 1) << 1 | (there >> (OCTREE_SELF + z) & 1) << 2 |
+	       (there >> (x + y) & 1) << 3 | (there >> (OCTREE_SELF + y + z) & 1) << 4 | (there >> (x + z) & 1) << 5 |
+	       (there >> (x + y + z) & 1) << 6;
 }
 
 static void fill(uint32_t *p, size_t n)
@@ -106,7 +116,7 @@ void *codes_mixed_model(void)
 	return model;
 }
 
-static inline __attribute__((always_inline)) void learn(const struct model *model, uint32_t *p, unsigned bit)
+ALWAYS void learn(const struct model *model, uint32_t *p, unsigned bit)
 {
 	const uint32_t count = *p & 1023;
 	const int64_t wrong = (int64_t)(bit << 22) - (int64_t)(*p >> 10);
@@ -116,17 +126,18 @@ static inline __attribute__((always_inline)) void learn(const struct model *mode
 	*p = kept << 10 | (count + (count < COUNTS));
 }
 
-static inline __attribute__((always_inline)) unsigned mix_bit(struct model *model, struct coder *coder,
-                                                              int is_decoding, uint32_t *const p[CONTEXTS],
-                                                              unsigned set, unsigned bit)
+ALWAYS unsigned mix_bit(struct model *model, struct coder *coder, int is_decoding, uint32_t *const p[CONTEXTS],
+                        unsigned set, unsigned bit)
 {
 	int32_t *weight = model->weight[set], logit[CONTEXTS + 1], wrong;
 	int64_t sum = 0;
 	uint32_t share;
 
+#pragma GCC unroll 8
 	for (int i = 0; i < CONTEXTS; i++)
 		logit[i] = model->logit[*p[i] >> 20];
 	logit[CONTEXTS] = 256;
+#pragma GCC unroll 8
 	for (int i = 0; i <= CONTEXTS; i++)
 		sum += (int64_t)logit[i] * weight[i];
 	sum >>= 16;
@@ -134,11 +145,13 @@ static inline __attribute__((always_inline)) unsigned mix_bit(struct model *mode
 	share = model->share[2048 + sum];
 	bit = coder_bit(coder, is_decoding, share, bit);
 	wrong = (int32_t)(bit << 16) - (int32_t)share;
+#pragma GCC unroll 8
 	for (int i = 0; i <= CONTEXTS; i++) {
 		const int64_t to = weight[i] + (((int64_t)logit[i] * wrong * LEARN + (1 << 17)) >> 18);
 
 		weight[i] = (int32_t)(to < -(1 << 20) ? -(1 << 20) : to > 1 << 20 ? 1 << 20 : to);
 	}
+#pragma GCC unroll 8
 	for (int i = 0; i < CONTEXTS; i++)
 		learn(model, p[i], bit);
 	return bit;
@@ -152,8 +165,7 @@ static inline uint32_t scatter(uint64_t x, int bits)
 /* All children around an octant, itself in the middle: 3x3x3 of the neighbourhood's 4x4x4. */
 #define WINDOW 0x77707770777u
 
-static inline __attribute__((always_inline)) void code_node(struct codes_job *job, uint32_t node,
-                                                            const struct octree_near *near, int is_decoding)
+ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_near *near, int is_decoding)
 {
 	struct model *model = job->model;
 	const struct octree_level *level = &job->levels->at[job->level];
@@ -163,31 +175,29 @@ static inline __attribute__((always_inline)) void code_node(struct codes_job *jo
 	uint64_t known = 0; /* children of neighbours that come earlier, and own ones so far */
 	unsigned so_far = 0;
 
+#pragma GCC unroll 27
 	for (unsigned k = 0; k < OCTREE_NEAR; k++) {
 		const uint32_t at = near->at[k];
 
 		there |= (uint32_t)(at != OCTREE_NONE) << k;
-		if (at < node) {
-			const uint64_t spread = model->spread[level->code[at] & model->side[k]];
-
-			known |= spread << model->turn[k] | spread >> (-model->turn[k] & 63);
-		}
+		if (at < node)
+			known |= shift_to(model->spread[level->code[at] & side_of(k)], k);
 	}
 	faces = (there >> 4 & 1) | (there >> 10 & 1) << 1 | (there >> 12 & 1) << 2 | (there >> 14 & 1) << 3 |
 	        (there >> 16 & 1) << 4 | (there >> 22 & 1) << 5;
 	many = (uint32_t)__builtin_popcount(there) - 1;
+#pragma GCC unroll 8
 	for (unsigned j = 0; j < 8; j++) {
 		const unsigned corner = (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2), begun = 1u << j | so_far;
 		const uint64_t window = known >> corner & WINDOW;
-		uint32_t touched = 0, near_known = (uint32_t)__builtin_popcountll(window), most, *p[CONTEXTS];
+		const uint32_t touched = touched_by(j, there);
+		uint32_t near_known = (uint32_t)__builtin_popcountll(window), most, *p[CONTEXTS];
 		unsigned bit;
 
 		if (j == 7 && so_far == 0) { /* no code is 0 */
 			so_far = 128;
 			break;
 		}
-		for (int i = 0; i < 7; i++)
-			touched |= (there >> model->touch[j][i] & 1) << i;
 		most = near_known < 15 ? near_known : 15;
 		p[0] = &model->a[begun << 6 | faces];
 		p[1] = &model->b[scatter(window << 3 | j, B_BITS)];

@@ -116,7 +116,8 @@ static void print_draco(const struct octree *tree, double code_bits)
 	free(at);
 }
 
-static int print_packing(const struct octree *tree, enum octree_packing packing, double *bits, struct psr_error *err)
+static int print_packing(const char *name, const struct octree *tree, enum octree_packing packing, double *bits,
+                         struct psr_error *err)
 {
 	const double begin = used_seconds(), n = (double)tree->n_leaves;
 	double middle;
@@ -133,24 +134,34 @@ static int print_packing(const struct octree *tree, enum octree_packing packing,
 	octree_packed_shares(&shares, bytes, n_bytes);
 	*bits = 8.0 * (double)shares.codes / n;
 	if (rc == PSR_OK)
-		printf("%-8s %6.2f bits a leaf, codes %.2f, coded %5.1f and decoded %5.1f M leaves/s on one thread\n",
-		       packing == OCTREE_FAST ? "fast" : "packed", 8.0 * (double)n_bytes / n, *bits,
-		       n / (middle - begin) * 1e-6, n / (used_seconds() - middle) * 1e-6);
+		printf("%-8s %6.2f bits a leaf, codes %.2f, coded %5.1f and decoded %5.1f M leaves/s on one thread\n", name,
+		       8.0 * (double)n_bytes / n, *bits, n / (middle - begin) * 1e-6, n / (used_seconds() - middle) * 1e-6);
 	free(bytes);
 	if (rc == PSR_OK)
 		octree_destroy(again);
 	return rc;
 }
 
+/* The codes alone, then all that the leaves have, too; each packed small and fast. */
 static int print_packings(const struct octree *tree, struct psr_error *err)
 {
+	struct octree codes = *tree;
 	double bits, fast_bits;
 	int rc;
 
+	codes.normal = NULL;
+	codes.offset = NULL;
+	codes.color = NULL;
+	codes.material = NULL;
+
 	printf("%-8s %6.2f bits a leaf\n", "in core", 8.0 * (double)tree->n_codes / (double)tree->n_leaves);
-	rc = print_packing(tree, OCTREE_SMALL, &bits, err);
+	rc = print_packing("codes", &codes, OCTREE_SMALL, &bits, err);
 	if (rc == PSR_OK)
-		rc = print_packing(tree, OCTREE_FAST, &fast_bits, err);
+		rc = print_packing("- fast", &codes, OCTREE_FAST, &fast_bits, err);
+	if (rc == PSR_OK)
+		rc = print_packing("all", tree, OCTREE_SMALL, &bits, err);
+	if (rc == PSR_OK)
+		rc = print_packing("- fast", tree, OCTREE_FAST, &fast_bits, err);
 	if (rc == PSR_OK)
 		print_draco(tree, bits);
 	return rc;
