@@ -60,7 +60,8 @@ static size_t backing_below(const struct standing *s, size_t i)
 	return found;
 }
 
-/* The same of the whole tree, first near the leaf that was found last. A leaf counts where all nodes above it may back the place, in whatever order they are asked. */
+/* The same of the whole tree, first near the leaf that was found last. A leaf counts where all nodes above it may back
+ * the place, in whatever order they are asked. */
 static size_t find_backing(const struct standing *s, size_t last)
 {
 	size_t way[64], n = 0, deepest = 0, found = 0;

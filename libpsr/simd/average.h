@@ -6,8 +6,8 @@
 
 #define AVERAGE_MOST 2048 /* sub-pixels a row of a call */
 
-/* 16-bit linear light of the roots of base/root.h: light is clamped when it is averaged, so that highlights smaller than a
- * pixel keep what they send. Of n pixels with sub-pixels `stride` values from a row to the next; n << pass is at most
+/* 16-bit linear light of the roots of base/root.h: light is clamped when it is averaged, so that highlights smaller than
+ * a pixel keep what they send. Of n pixels with sub-pixels `stride` values from a row to the next; n << pass is at most
  * AVERAGE_MOST. */
 typedef void average_light_fn(uint16_t *light, const uint16_t *root, uint32_t stride, uint32_t n, unsigned pass);
 

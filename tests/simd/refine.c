@@ -1,4 +1,5 @@
-/* average_light, average_around, average_depth and holes: rows of any width, passes of any number, levels of any kind. */
+/* average_light, average_around, average_depth and holes: rows of any width, passes
+ * of any number, levels of any kind. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"

@@ -106,12 +106,14 @@ static int build(struct subject *s, const struct study_model *of)
 	return rc;
 }
 
-static int run_model(struct subject *s, const struct study_model *of)
+static int run_model(void *subject, struct study_model *of, int row)
 {
+	struct subject *s = subject;
 	struct study *study = s->view.study;
 	const double pixel = 2.0 / study->resolution, high = DPOINT_VIEW_HEIGHT * pixel;
 	int rc = dpoint_view_open(&s->view, of, high);
 
+	s->row = row;
 	for (int i = 0; i < N_ROWS; i++)
 		study_label(&study->table, s->row + i, "%.20s, %s", of->name, i < N_SETTINGS ? setting[i].name : "equal time");
 	if (rc == PSR_OK)
@@ -128,24 +130,13 @@ static int run_model(struct subject *s, const struct study_model *of)
 		psr_model_unref(s->blocks[i]);
 		s->blocks[i] = NULL;
 	}
-	s->row += N_ROWS;
 	return rc;
 }
 
 int table_dpoint_equal(struct study *study)
 {
-	const struct study_form form = { "model, way", columns, N_COLUMNS };
+	const struct dpoint_view_rows rows = { { "model, way", columns, N_COLUMNS }, N_ROWS, N_FINER, run_model };
 	struct subject s = { .row = 0 };
-	int rc = study_table_init(&study->table, form, study->n_models * N_ROWS, 1, study->err);
 
-	study->total = study->n_models * N_FINER;
-	if (rc == PSR_OK)
-		rc = psr_renderer_create(&study->renderer, study->err);
-	if (rc == PSR_OK)
-		rc = dpoint_view_init(&s.view, study);
-	for (int m = 0; rc == PSR_OK && m < study->n_models; m++)
-		rc = run_model(&s, &study->model[m]);
-	dpoint_view_fini(&s.view);
-	psr_renderer_destroy(study->renderer);
-	return rc;
+	return dpoint_view_table(&s.view, study, &rows, &s);
 }

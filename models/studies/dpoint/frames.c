@@ -69,11 +69,13 @@ static int put_errors(struct subject *s)
 }
 
 /* The materials are changed before models are made of them. */
-static int run_model(struct subject *s, const struct study_model *model)
+static int run_model(void *subject, struct study_model *model, int row)
 {
+	struct subject *s = subject;
 	struct study *study = s->view.study;
 	int rc = dpoint_view_open(&s->view, model, across(s, 1));
 
+	s->row = row;
 	if (rc == PSR_OK)
 		rc = study_dpoint_of_mesh(&s->way[0].model, study, model);
 	if (rc == PSR_OK)
@@ -98,18 +100,8 @@ static int run_model(struct subject *s, const struct study_model *model)
 
 int table_dpoint_frames(struct study *study)
 {
-	const struct study_form form = { "model, size", columns, N_COLUMNS };
+	const struct dpoint_view_rows rows = { { "model, size", columns, N_COLUMNS }, N_SIZES, N_SIZES, run_model };
 	struct subject s = { .row = 0 };
-	int rc = study_table_init(&study->table, form, study->n_models * N_SIZES, 1, study->err);
 
-	study->total = study->n_models * N_SIZES;
-	if (rc == PSR_OK)
-		rc = psr_renderer_create(&study->renderer, study->err);
-	if (rc == PSR_OK)
-		rc = dpoint_view_init(&s.view, study);
-	for (int m = 0; rc == PSR_OK && m < study->n_models; m++)
-		rc = run_model(&s, &study->model[m]);
-	dpoint_view_fini(&s.view);
-	psr_renderer_destroy(study->renderer);
-	return rc;
+	return dpoint_view_table(&s.view, study, &rows, &s);
 }

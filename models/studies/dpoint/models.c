@@ -55,8 +55,9 @@ static int measure(double value[N_COLUMNS], struct dpoint_view *view, int is_sim
 	return rc;
 }
 
-static int run_model(struct dpoint_view *view, struct study_model *of, int row)
+static int run_model(void *subject, struct study_model *of, int row)
 {
+	struct dpoint_view *view = subject;
 	struct study *study = view->study;
 	int rc = PSR_OK;
 
@@ -77,18 +78,8 @@ static int run_model(struct dpoint_view *view, struct study_model *of, int row)
 
 int table_dpoint_models(struct study *study)
 {
-	const struct study_form form = { "model", columns, N_COLUMNS };
-	struct dpoint_view view = { .study = NULL };
-	int rc = study_table_init(&study->table, form, study->n_models * 2, 1, study->err);
+	const struct dpoint_view_rows rows = { { "model", columns, N_COLUMNS }, 2, 2, run_model };
+	struct dpoint_view view;
 
-	study->total = study->n_models * 2;
-	if (rc == PSR_OK)
-		rc = psr_renderer_create(&study->renderer, study->err);
-	if (rc == PSR_OK)
-		rc = dpoint_view_init(&view, study);
-	for (int m = 0; rc == PSR_OK && m < study->n_models; m++)
-		rc = run_model(&view, &study->model[m], 2 * m);
-	dpoint_view_fini(&view);
-	psr_renderer_destroy(study->renderer);
-	return rc;
+	return dpoint_view_table(&view, study, &rows, &view);
 }

@@ -38,6 +38,23 @@ void dpoint_view_fini(struct dpoint_view *view)
 	memset(view, 0, sizeof *view);
 }
 
+int dpoint_view_table(struct dpoint_view *view, struct study *study, const struct dpoint_view_rows *rows, void *subject)
+{
+	int rc = study_table_init(&study->table, rows->form, study->n_models * rows->n, 1, study->err);
+
+	*view = (struct dpoint_view){ .study = study };
+	study->total = study->n_models * rows->n_steps;
+	if (rc == PSR_OK)
+		rc = psr_renderer_create(&study->renderer, study->err);
+	if (rc == PSR_OK)
+		rc = dpoint_view_init(view, study);
+	for (int m = 0; rc == PSR_OK && m < study->n_models; m++)
+		rc = rows->fill(subject, &study->model[m], rows->n * m);
+	dpoint_view_fini(view);
+	psr_renderer_destroy(study->renderer);
+	return rc;
+}
+
 static void set_scene(struct dpoint_view *view, double across, int is_close)
 {
 	const struct study_model *of = view->of;

@@ -35,6 +35,16 @@ struct dpoint_way {
 int dpoint_view_init(struct dpoint_view *view, struct study *study);
 void dpoint_view_fini(struct dpoint_view *view);
 
+/* A table of some rows a model. */
+struct dpoint_view_rows {
+	struct study_form form;
+	int n, n_steps; /* a model: rows, study_step()s */
+	int (*fill)(void *subject, struct study_model *of, int row); /* those of a model, from this one on */
+};
+
+/* Makes the study's table, its renderer and the view, fills in the rows of all its models, and ends renderer and view. */
+int dpoint_view_table(struct dpoint_view *view, struct study *study, const struct dpoint_view_rows *rows, void *subject);
+
 /* Shows another model, whose materials get DPOINT_VIEW_ROUGHNESS, and finds its brightest place in a picture `across`
  * radii high. */
 int dpoint_view_open(struct dpoint_view *view, const struct study_model *of, double across);
