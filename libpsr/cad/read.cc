@@ -104,6 +104,7 @@ void cut(const TopoDS_Shape &shape, const cad_module_source &source, double long
 	how.Deflection = how.DeflectionInterior = source.deflection * longest_side;
 	if (source.rim > 0)
 		how.Deflection = std::min(source.rim, source.deflection) * longest_side;
+	how.InParallel = Standard_True; // face by face: the same triangles
 	BRepMesh_IncrementalMesh(shape, how);
 }
 
