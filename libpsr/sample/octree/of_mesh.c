@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "of_mesh.h"
+#include "facet.h"
 #include "octree/build/voxels.h"
 #include "surface/material.h"
 #include "surface/surface.h"
@@ -15,17 +16,7 @@
 #define DIAGONAL 1.4142135623730951 /* of a face of a leaf: the diameter of filters, as for samples of a lattice */
 #define ROUNDING 1e-6               /* of normals: no line goes between two triangles */
 #define REACH (0.8660254037844386 + ROUNDING) /* of offsets: half of a leaf's own diagonal */
-#define OPPOSITE (-0.5f)            /* cosines: another side of a thing; */
-#define ASIDE (-0.1f)               /* the same one, or one around an edge */
-
-/* The surface of one triangle within a leaf. */
-struct facet {
-	uint32_t triangle;
-	double corner[3][3]; /* of the whole triangle, in leaves from the leaf's low corner */
-	double area, middle[3];
-	float normal[3];
-	struct look look;
-};
+#define FACES 3    /* that meet in a leaf: a corner */
 
 struct leaf_maker {
 	const struct psr_mesh *mesh;
@@ -151,23 +142,19 @@ static double meet(const struct facet *facet, const float normal[3])
 	return u >= -ROUNDING && v >= -ROUNDING && u + v <= 1.0 + ROUNDING ? v3d_dot(e2, q) / det : INFINITY;
 }
 
-static int is_on_side(const struct facet *facet, const float side[3])
-{
-	return v3f_dot(facet->normal, side) > ASIDE;
-}
-
-/* Of the facets of a side, times their areas. The lobes' squared widths are added by what they mirror. */
-struct facet_sums {
-	double area, normal[3], color[3], middle[3];
+/* Of facets, times their areas. The lobes' squared widths are added by what they mirror. */
+struct look_sums {
+	double area, color[3];
 	double metallic, open, rest, reflected, mirrored, width2, plain_width2;
 };
 
-static void add_look(struct facet_sums *sums, const struct look *look, double area)
+static void add_look(struct look_sums *sums, const struct look *look, double area)
 {
 	const double metallic = (double)look->metallic, rest = 1.0 - metallic, reflected = rest * (double)look->reflectance;
 	const double width = (double)look->roughness * (double)look->roughness;
 	double mirrored = 3.0 * reflected;
 
+	sums->area += area;
 	for (int c = 0; c < 3; c++) {
 		sums->color[c] += area * (double)look->base[c];
 		mirrored += metallic * (double)look->base[c];
@@ -182,7 +169,7 @@ static void add_look(struct facet_sums *sums, const struct look *look, double ar
 }
 
 /* A place within a leaf of one look has that look's lobe, whatever the normals are around: as samples of blocks do. */
-static uint32_t material_of(const struct facet_sums *sums)
+static uint32_t material_of(const struct look_sums *sums)
 {
 	const double width2 = sums->mirrored > 0.0 ? sums->width2 / sums->mirrored : sums->plain_width2 / sums->area;
 	const struct look look = { .metallic = (float)(sums->metallic / sums->area),
@@ -194,33 +181,18 @@ static uint32_t material_of(const struct facet_sums *sums)
 	return (uint32_t)(material_encode(&look) >> 40);
 }
 
-/* Sums up the facets on the side of the greatest one. */
-static void add_facets(struct leaf_maker *m, const float side[3], struct facet_sums *sums)
+/* Whether a highlight may show more than a quarter of what white does: F0 / (4 a^2), a being the roughness squared. */
+static int shines(const struct look_sums *sums)
 {
-	int is_both = 0;
-
-	for (size_t i = 0; i < m->n_facets; i++) {
-		const struct facet *f = &m->facet[i];
-
-		is_both |= v3f_dot(f->normal, side) < OPPOSITE;
-		if (!is_on_side(f, side))
-			continue;
-		sums->area += f->area;
-		add_look(sums, &f->look, f->area);
-		for (int c = 0; c < 3; c++) {
-			sums->normal[c] += f->area * (double)f->normal[c];
-			sums->middle[c] += f->area * f->middle[c];
-		}
-	}
-	m->report.n_both += (uint64_t)is_both;
+	return sums->mirrored * sums->mirrored > 3.0 * sums->area * sums->width2;
 }
 
-static double find_offset(const struct leaf_maker *m, const float side[3], const float normal[3], const double middle[3])
+static double find_offset(const struct leaf_maker *m, const float normal[3], const double middle[3])
 {
 	double nearest = INFINITY;
 
 	for (size_t i = 0; i < m->n_facets; i++) {
-		const double t = is_on_side(&m->facet[i], side) ? meet(&m->facet[i], normal) : INFINITY;
+		const double t = meet(&m->facet[i], normal);
 
 		nearest = fabs(t) < fabs(nearest) ? t : nearest;
 	}
@@ -232,25 +204,47 @@ static double find_offset(const struct leaf_maker *m, const float side[3], const
 	return nearest;
 }
 
+/* Sets a leaf's normal, and where its point is along it. */
+static void set_plane(const struct leaf_maker *m, uint64_t leaf)
+{
+	struct octree *tree = m->maker.tree;
+	double area = 0.0, normal[3] = { 0 }, middle[3] = { 0 };
+	float mean[3];
+
+	for (size_t i = 0; i < m->n_facets; i++) {
+		const struct facet *f = &m->facet[i];
+
+		area += f->area;
+		for (int c = 0; c < 3; c++) {
+			normal[c] += f->area * (double)f->normal[c];
+			middle[c] += f->area * f->middle[c];
+		}
+	}
+	for (int c = 0; c < 3; c++) {
+		mean[c] = (float)(normal[c] / area);
+		middle[c] /= area;
+	}
+	tree->normal[leaf] = psr_direction_encode(mean);
+	tree->offset[leaf] =
+		(uint8_t)octree_offset_step(find_offset(m, psr_direction_table()[tree->normal[leaf]], middle));
+}
+
+/* The mean normal of two faces is nearest to both of them, but a mirror with it shows what neither of them does. */
 static void set_leaf(struct leaf_maker *m, uint64_t leaf)
 {
 	struct octree *tree = m->maker.tree;
-	const struct facet *greatest = m->facet;
-	struct facet_sums sums = { 0 };
-	float mean[3];
+	struct look_sums sums = { 0 };
 
-	for (size_t i = 1; i < m->n_facets; i++)
-		greatest = m->facet[i].area > greatest->area ? &m->facet[i] : greatest;
-	add_facets(m, greatest->normal, &sums);
-	for (int c = 0; c < 3; c++) {
-		mean[c] = (float)(sums.normal[c] / sums.area);
-		sums.middle[c] /= sums.area;
+	m->report.n_both += (uint64_t)facets_keep_side(m->facet, &m->n_facets);
+	for (size_t i = 0; i < m->n_facets; i++)
+		add_look(&sums, &m->facet[i].look, m->facet[i].area);
+	for (int c = 0; c < 3; c++)
 		tree->color[leaf][c] = psr_linear_to_srgb((float)(sums.color[c] / sums.area));
-	}
 	octree_put_material(tree->material[leaf], material_of(&sums));
-	tree->normal[leaf] = psr_direction_encode(mean);
-	tree->offset[leaf] = (uint8_t)octree_offset_step(
-		find_offset(m, greatest->normal, psr_direction_table()[tree->normal[leaf]], sums.middle));
+	if (shines(&sums))
+		for (int face = 1; face < FACES && facets_keep_face(m->facet, &m->n_facets); face++)
+			;
+	set_plane(m, leaf);
 }
 
 static int leaf_room(struct leaf_maker *m, uint64_t leaf)

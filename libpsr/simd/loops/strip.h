@@ -241,6 +241,19 @@ static void prepare_highlights(struct strip *s, const float ambient[3])
 	}
 }
 
+/* Mixed normals shorter than this, of faces 28 degrees apart, are of an edge. */
+#define EWA_EDGE 0.97f
+
+/* Widens a lobe by the spread of the normals around an edge, as octree_mean_material() does: a mirror with the mean
+ * normal of two faces would show what neither of them does. */
+static uint64_t ewa_widen(uint64_t attr, float length)
+{
+	const float roughness = (float)(int32_t)(attr >> 56) * (1 / 255.0f), a = roughness * roughness;
+	const float wide = a * a + 2 * (EWA_EDGE - length) / length, most = psr_choose(wide < 1, wide, 1);
+
+	return (attr & 0xffffffffffffff) | (uint64_t)(int32_t)(__builtin_sqrtf(__builtin_sqrtf(most)) * 255 + 0.5f) << 56;
+}
+
 /* Takes the looks of samples from the sums of their pixels. */
 static void ewa_resolve(struct strip *strip, const struct strip_view *view, uint32_t first, uint32_t end)
 {
@@ -266,6 +279,9 @@ static void ewa_resolve(struct strip *strip, const struct strip_view *view, uint
 		strip->nx[i] = n[0] * unit;
 		strip->ny[i] = n[1] * unit;
 		strip->nz[i] = n[2] * unit;
+		const float whole = (float)(int32_t)weight * 511, length = __builtin_sqrtf(length2) / whole;
+		if (length < EWA_EDGE)
+			strip->attr[i] = ewa_widen(strip->attr[i], length);
 	}
 }
 
