@@ -210,7 +210,10 @@ static void print_text(const struct summary *s)
 	print_presets(s->presets);
 	print_calibration(s->calibration);
 	printf("file              %.2f MB, %s\n", (double)s->file_bytes / 1e6, s->is_packed ? "packed" : "not packed");
-	if (s->is_prefix)
+	if (s->is_prefix && s->prefix.levels == s->prefix.of_levels)
+		printf("                  the beginning of %.2f MB: all %" PRIu32 " levels of its octree, without its scan\n",
+		       (double)s->prefix.of_bytes / 1e6, s->prefix.levels);
+	else if (s->is_prefix)
 		printf("                  the beginning of %.2f MB: %" PRIu32 " of %" PRIu32 " levels of its octree\n",
 		       (double)s->prefix.of_bytes / 1e6, s->prefix.levels, s->prefix.of_levels);
 	printf("memory            %.2f MB", (double)s->bytes / 1e6);

@@ -177,7 +177,7 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 	    && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
-		if (model->opened.octree_levels > 0)
+		if (model->opened.octree_levels < model->opened.of_levels)
 			fprintf(stderr, "%s: %s has %u of its %u levels, for %u pixels; edges will look rough here without the others: "
 			        "raise --level, or leave it out\n", program, model->name, model->opened.octree_levels,
 			        model->opened.of_levels, model->opened.resolution);

@@ -140,6 +140,7 @@ void link_errand_leave(struct link_errand *errand); /* it ends by itself; NULL i
 struct link_open_model {
 	char name[PSR_WIRE_MAX_NAME + 1];
 	uint32_t pixels;         /* that it was asked for */
+	int is_all;              /* there is no more of it, though it be a beginning: its file ends early */
 	struct psr_msg_opened opened; /* handle 0: not open */
 	struct psr_msg_preset *preset;
 	uint32_t n_presets;
@@ -158,7 +159,7 @@ struct link_open_model *link_models_find(const struct link_models *models, const
  * The list is the caller's; *n 0: none, and NULL. MEMORY. */
 int link_models_lack(struct link_errand_model **out, uint32_t *n, const struct link_models *models,
                      const struct link_wish *wish, int is_fine);
-/* Returns whether each model of the wish is open for pictures of its size, and whole. */
+/* Returns whether each model of the wish is open for pictures of its size, and whole, or as much as there is. */
 int link_models_are_fine(const struct link_models *models, const struct link_wish *wish);
 /* Opens it on the connection, in the place of an open one of its name. */
 int link_models_open(struct link_models *models, const struct link_errand_model *wanted, struct psr_error *err);

@@ -33,7 +33,7 @@ struct link_open_model *link_models_find(const struct link_models *models, const
 
 static int is_fine_model(const struct link_open_model *model, const struct link_wish *wish)
 {
-	return model->pixels == wish->pixels && model->opened.octree_levels == 0;
+	return model->pixels == wish->pixels && (model->opened.octree_levels == 0 || model->is_all);
 }
 
 static int is_listed(const struct link_errand_model *list, uint32_t n, const char *name)
@@ -148,6 +148,7 @@ int link_models_open(struct link_models *models, const struct link_errand_model 
 	model->preset = preset;
 	model->n_presets = n_presets;
 	model->pixels = wanted->pixels;
+	model->is_all = wanted->levels == 0 || wanted->levels > opened.octree_levels;
 	return PSR_OK;
 }
 

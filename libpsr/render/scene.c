@@ -21,7 +21,10 @@ static int check_tint(const struct psr_instance *instance, unsigned i, struct ps
 	if (by == PSR_COLOR_OWN || by == PSR_COLOR_HEIGHT || (by == PSR_COLOR_INTENSITY && scan->has_intensity)
 	    || (by == PSR_COLOR_CLASS && scan->has_class) || (by == PSR_COLOR_RETURN && scan->has_return))
 		return PSR_OK;
-	if (cubes != NULL && psr_model_is_prefix(instance->model, &prefix))
+	if (cubes != NULL && psr_model_is_prefix(instance->model, &prefix) && prefix.levels == prefix.of_levels)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: %s of a scan stand behind all levels of a packed octree, and "
+		                "the model's file ends before them", i, names[by]);
+	if (cubes != NULL && prefix.levels > 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: %s of a scan stand behind all levels of a packed octree, and "
 		                "these are %u of %u; ask for all of them", i, names[by], prefix.levels, prefix.of_levels);
 	return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %u: its %s no %s of a scan; an octree has them that psr-model "

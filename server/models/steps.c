@@ -62,7 +62,10 @@ static void log_loaded(const struct opening *o, const struct catalogue_model *mo
 {
 	struct psr_model_prefix prefix;
 
-	if (psr_model_is_prefix(model->model, &prefix))
+	if (psr_model_is_prefix(model->model, &prefix) && prefix.levels == prefix.of_levels)
+		log_info("model %s: loaded, all %u levels of its octree without its scan, %.1f MB", o->file.name, prefix.levels,
+		         (double)model->bytes * 1e-6);
+	else if (prefix.levels > 0)
 		log_info("model %s: loaded, %u of the %u levels of its octree, %.1f MB", o->file.name, prefix.levels,
 		         prefix.of_levels, (double)model->bytes * 1e-6);
 	else

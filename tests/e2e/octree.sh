@@ -41,6 +41,11 @@ head -c $(($(stat -c %s "$work/scan.psr") * 2 / 3)) "$work/scan.psr" >"$work/par
 psr-model info "$work/part.psr" --json >"$work/scan.json"
 is "a part of it is a coarser model, without classes" "5 7 {}" \
 	"$(value "$work/scan.json" prefix.levels) $(value "$work/scan.json" prefix.of_levels) $(value "$work/scan.json" octree.scan 2>/dev/null || echo '{}')"
+head -c -1 "$work/scan.psr" >"$work/part.psr"
+check "all but the last byte is all of the octree, without its scan" \
+	bash -c 'psr-model info "$1" | grep -q "all 7 levels of its octree, without its scan"' - "$work/part.psr"
+refuses "its classes as colours" 4 "the model's file ends before them" \
+	psr shot "$work/part.psr" --color-by class -o "$work/none.png"
 refuses "a scan of blocks" 2 "add --representation octree" psr-model build "$work/ball.las" \
 	--representation blocks --scan -o "$work/none.psr"
 

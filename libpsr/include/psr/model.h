@@ -87,7 +87,7 @@ const struct psr_presets *psr_model_presets(const struct psr_model *model); /* n
 /* A packed octree's file that ends early, as a download that broke, opens as a coarser model: that of the levels that
  * are there. Its content id is that of this model. */
 struct psr_model_prefix {
-	uint32_t levels, of_levels; /* of the octree: there, in the whole file */
+	uint32_t levels, of_levels; /* of the octree: there, in the whole file; the same where its scan alone is missing */
 	uint64_t of_bytes;          /* of the whole file */
 };
 int psr_model_is_prefix(const struct psr_model *model, struct psr_model_prefix *prefix); /* whether it is one */

@@ -16,7 +16,7 @@
 #define DIAGONAL 1.4142135623730951 /* of a face of a leaf: the diameter of filters, as for samples of a lattice */
 #define ROUNDING 1e-6               /* of normals: no line goes between two triangles */
 #define REACH (0.8660254037844386 + ROUNDING) /* of offsets: half of a leaf's own diagonal */
-#define FACES 3    /* that meet in a leaf: a corner */
+#define FACES 3 /* that meet in a leaf: a corner */
 
 struct leaf_maker {
 	const struct psr_mesh *mesh;

@@ -13,13 +13,13 @@ struct octree_mesh_report {
 };
 
 /* Builds a tree with normals, offsets, colours and materials: one of all leaves, if they are the same. A leaf's normal,
- * colour and material are means over the surface within the
- * leaf, weighted by area; textures are filtered over a circle of its diagonal. The offset is where the line through
- * the leaf's middle along the normal meets the surface, as near to the middle as it does; where it misses, where the
- * middle of the surface within the leaf lies along it. Transparent places have no leaves, nor have cells that a surface
- * only touches. Normals are on the side from which the triangles are counter-clockwise; closed parts of two-sided
- * materials that are inside out are turned. The tree is one-sided if the surface is closed and few leaves hold two
- * sides. report may be NULL.
+ * colour and material are means over the surface within the leaf, weighted by area; where what shines has an edge, the
+ * normal is that of the face with the most area. Textures are filtered over a circle of the leaf's diagonal. The offset
+ * is where the line through the leaf's middle along the normal meets the surface, as near to the middle as it does;
+ * where it misses, where the middle of the surface within the leaf lies along it. Transparent places have no leaves,
+ * nor have cells that a surface only touches. Normals are on the side from which the triangles are counter-clockwise;
+ * closed parts of two-sided materials that are inside out are turned. The tree is one-sided if the surface is closed
+ * and few leaves hold two sides. report may be NULL.
  *
  * ARG: options out of range, no triangles; FORMAT: nothing is opaque; IO, MEMORY, CANCELLED. */
 int octree_of_mesh(struct octree **out, struct octree_mesh_report *report, const struct psr_mesh *mesh,

@@ -320,6 +320,48 @@ static void leaves_have_the_material_of_their_surface(void **state)
 	meshes_free(mesh);
 }
 
+/* The normal is of a face to half a step of its code, where the mean of two faces would be 45 degrees off both. */
+static void look_at_face(const struct point *p, void *userdata)
+{
+	double most = 0.0, outer = 0.0;
+
+	(void)userdata;
+	for (int c = 0; c < 3; c++) {
+		most = fmax(most, fabs(p->normal[c]));
+		outer = fmax(outer, fabs(p->at[c]));
+	}
+	assert_true(most > cos(QUANTISED / DEGREES));
+	assert_true(fabs(outer - 1.0) < HALF_STEP * 2.0 / SIDE);
+}
+
+static void leaves_that_shine_are_of_one_face(void **state)
+{
+	struct psr_mesh *mesh = meshes_box(1.0, 0);
+	uint64_t n_leaves;
+	struct octree *tree;
+
+	(void)state;
+	mesh->material->metallic = 1;
+	mesh->material->roughness = 0.3f;
+	tree = tree_of(mesh);
+	n_leaves = tree->n_leaves;
+	each_point(tree, look_at_face, NULL);
+	octree_destroy(tree);
+	mesh->material->metallic = 0;
+	mesh->material->roughness = 1;
+	tree = tree_of(mesh);
+	assert_int_equal(tree->n_leaves, n_leaves);
+	double most = 1.0;
+	for (uint64_t i = 0; i < tree->n_leaves; i++) {
+		const float *n = psr_direction_table()[tree->normal[i]];
+
+		most = fmin(most, (double)fmaxf(fmaxf(fabsf(n[0]), fabsf(n[1])), fabsf(n[2])));
+	}
+	assert_true(most < cos(45.0 / DEGREES)); /* a corner's */
+	octree_destroy(tree);
+	meshes_free(mesh);
+}
+
 /* Half of a texture is not there: its leaves neither, but for those about the border. */
 static void look_at_there(const struct point *p, void *userdata)
 {
@@ -463,6 +505,7 @@ int main(void)
 		cmocka_unit_test(textures_finer_than_leaves_are_filtered),
 		cmocka_unit_test(colors_of_vertices_are_those_of_the_middle),
 		cmocka_unit_test(leaves_have_the_material_of_their_surface),
+		cmocka_unit_test(leaves_that_shine_are_of_one_face),
 		cmocka_unit_test(transparent_places_have_no_leaves),
 		cmocka_unit_test(both_sides_of_a_thin_sheet_are_counted),
 		cmocka_unit_test(closed_parts_of_two_sides_are_turned_out),

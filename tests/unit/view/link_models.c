@@ -11,12 +11,23 @@
 static struct link_instance instance;
 static struct link_wish wish;
 
+/* Writes a file that lacks the last byte of another one. */
+static void write_cut(const char *name, const char *of)
+{
+	char path[2 * PATH_MAX], command[5 * PATH_MAX];
+
+	snprintf(path, sizeof path, "%s/%s", folder, name);
+	snprintf(command, sizeof command, "head -c -1 '%s/%s' >'%s'", folder, of, path);
+	assert_int_equal(system(command), 0);
+}
+
 /* Beginnings of 7 and 9 of its 11 levels. */
 static int set_up_cloud(void **state)
 {
 	set_up(state);
 	daemon_stop(&psrd);
 	cloud_write(folder, "cloud.psr", 11, 6000);
+	write_cut("cut.psr", "cloud.psr");
 	start_psrd(NULL);
 	return 0;
 }
@@ -100,8 +111,8 @@ static void a_list_comes_beside_pictures(void **state)
 		wait_news(20);
 		list = link_list_take(link_, &n);
 	}
-	assert_int_equal(n, 3);
-	assert_string_equal(list[1].name, "plate");
+	assert_int_equal(n, 4);
+	assert_string_equal(list[2].name, "plate");
 	free(list);
 	link_close(link_);
 }
@@ -219,6 +230,29 @@ static void a_packed_octree_is_shown_a_step_after_the_other(void **state)
 	link_close(link_);
 }
 
+/* Nobody asks again for what is not there. */
+static void a_file_that_ends_early_is_shown_as_far_as_it_goes(void **state)
+{
+	struct link_picture *picture;
+	int is_coarse = 1;
+
+	(void)state;
+	open_link(address);
+	wish_default(&wish, &instance, "cut");
+	say_wish(&wish);
+	for (int64_t end = clock_ms() + PATIENCE_MS; is_coarse && clock_ms() < end;) {
+		wait_news(20);
+		picture = link_take(link_);
+		if (picture != NULL) {
+			is_coarse = picture->is_coarse;
+			assert_true(is_coarse || missing_levels(picture) == 2);
+		}
+		link_release(picture);
+	}
+	assert_false(is_coarse);
+	link_close(link_);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -227,6 +261,7 @@ int main(void)
 		cmocka_unit_test(a_list_comes_beside_pictures),
 		cmocka_unit_test(a_coarse_model_is_shown_until_the_fine_one_is_built),
 		cmocka_unit_test(a_packed_octree_is_shown_a_step_after_the_other),
+		cmocka_unit_test(a_file_that_ends_early_is_shown_as_far_as_it_goes),
 	};
 
 	return cmocka_run_group_tests(tests, set_up_cloud, tear_down);
