@@ -181,10 +181,10 @@ static uint32_t material_of(const struct look_sums *sums)
 	return (uint32_t)(material_encode(&look) >> 40);
 }
 
-/* Whether a highlight may show more than a quarter of what white does: F0 / (4 a^2), a being the roughness squared. */
+/* Whether a highlight may be brighter than white: F0 / (4 a^2), a being the roughness squared. */
 static int shines(const struct look_sums *sums)
 {
-	return sums->mirrored * sums->mirrored > 3.0 * sums->area * sums->width2;
+	return sums->mirrored * sums->mirrored > 12.0 * sums->area * sums->width2;
 }
 
 static double find_offset(const struct leaf_maker *m, const float normal[3], const double middle[3])

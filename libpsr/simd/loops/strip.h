@@ -244,13 +244,17 @@ static void prepare_highlights(struct strip *s, const float ambient[3])
 /* Mixed normals shorter than this, of faces 28 degrees apart, are of an edge. */
 #define EWA_EDGE 0.97f
 
-/* Widens a lobe by the spread of the normals around an edge, as octree_mean_material() does: a mirror with the mean
- * normal of two faces would show what neither of them does. */
+/* Widens a lobe whose highlight may be brighter than white (of_mesh.c) by the spread of the normals around an edge, as
+ * octree_mean_material() does: a mirror with the mean normal of two faces would show what neither of them does. */
 static uint64_t ewa_widen(uint64_t attr, float length)
 {
+	const float metallic = (float)(int32_t)(attr >> 40 & 31) * (1 / 31.0f);
+	const float root = (float)(int32_t)(attr >> 45 & 31) * (1 / 30.0f);
 	const float roughness = (float)(int32_t)(attr >> 56) * (1 / 255.0f), a = roughness * roughness;
 	const float wide = a * a + 2 * (EWA_EDGE - length) / length, most = psr_choose(wide < 1, wide, 1);
 
+	if (!(metallic + (1 - metallic) * (root * root) > 4 * (a * a)))
+		return attr;
 	return (attr & 0xffffffffffffff) | (uint64_t)(int32_t)(__builtin_sqrtf(__builtin_sqrtf(most)) * 255 + 0.5f) << 56;
 }
 
