@@ -253,8 +253,8 @@ static struct psr_model *make_roof(uint32_t material)
 	return model;
 }
 
-/* A mirror at the ridge would reflect the light behind the camera; what is there are slopes that do not. A share t of the
- * right slope gives a mean normal of length L = sqrt((1 + (1 - 2t)^2) / 2), atan(1 - 2t) off the view, and so a squared
+/* A mirror at the ridge would reflect the light behind the camera; what is there are slopes that do not. A share t of
+ * the right slope gives a mean normal of length L = sqrt((1 + (1 - 2t)^2) / 2), atan(1 - 2t) off the view, and so a squared
  * lobe of 2 (0.97 - L) / L: where it shows most, at t = 0.3, it shows 0.40 of white. 0.45 is code 178. */
 static void edges_of_metal_do_not_glitter(void **state)
 {
