@@ -3,13 +3,15 @@
 #include <math.h>
 #include <string.h>
 #include "base/direction.h"
+#include "base/maths.h"
 #include "base/vec.h"
 #include "look.h"
 #include "rectangle.h"
 
 #define MOST_UNITS (1u << 20) /* of a side */
+#define TURNED 0.25           /* of a cell: normals that turn within so little are let be */
 
-/* How many units a side has. */
+/* How many units the longest side has, and the one that x runs along. */
 static uint32_t units_of(const struct cutting *c)
 {
 	return c->n * c->grains * c->units;
@@ -20,8 +22,9 @@ static void weigh(double weight[3], const struct cutting *c, double x, double y)
 {
 	const double unit = 1.0 / units_of(c);
 
-	weight[(c->apex + 1) % 3] = x * unit;
-	weight[(c->apex + 2) % 3] = y * unit;
+	y *= c->ratio;
+	weight[c->along] = x * unit;
+	weight[3 - c->apex - c->along] = y * unit;
 	weight[c->apex] = 1 - (x + y) * unit;
 }
 
@@ -73,22 +76,48 @@ static int local_at(struct dpoint_local *local, const struct cutting *c, const d
 	return 1;
 }
 
-/* A piece begins x and y units from the apex, and its two sides are `size` long; a triangle if it reaches the longest
- * side. */
+/* A piece begins x and y units from the apex, and is `size` units long on both sides; the longest side cuts it off. */
 struct piece {
 	uint32_t x, y, size;
 };
 
-static int is_triangle(const struct cutting *c, const struct piece *p)
+/* Whether it begins beyond the longest side, or on it. */
+static int is_beyond(const struct cutting *c, const struct piece *p)
 {
-	return p->x + p->y + p->size == units_of(c);
+	return p->x + (uint64_t)c->ratio * p->y >= units_of(c);
+}
+
+/* How high it is where it begins and where it ends; none at the end: a triangle. */
+static void heights_of(double height[2], const struct cutting *c, const struct piece *p)
+{
+	for (uint32_t i = 0; i < 2; i++)
+		height[i] = fmin(p->size, (double)(units_of(c) - p->x - i * p->size) / c->ratio - p->y);
 }
 
 static void weigh_middle(double weight[3], const struct cutting *c, const struct piece *p)
 {
-	const double half = p->size * (is_triangle(c, p) ? 1.0 / 3 : 0.5);
+	double height[2];
 
-	weigh(weight, c, p->x + half, p->y + half);
+	heights_of(height, c, p);
+	if (height[1] > 0)
+		weigh(weight, c, p->x + p->size * 0.5, p->y + (height[0] + height[1]) * 0.25);
+	else
+		weigh(weight, c, p->x + p->size * (1.0 / 3), p->y + height[0] * (1.0 / 3));
+}
+
+/* The weights of a piece's four corners; of a triangle the last two are one. */
+static void weigh_corners(double weight[4][3], const struct cutting *c, const struct piece *p)
+{
+	double height[2];
+
+	heights_of(height, c, p);
+	weigh(weight[0], c, p->x, p->y);
+	weigh(weight[1], c, p->x + p->size, p->y);
+	weigh(weight[3], c, p->x, p->y + height[0]);
+	if (height[1] > 0)
+		weigh(weight[2], c, p->x + p->size, p->y + height[1]);
+	else
+		memcpy(weight[2], weight[3], sizeof weight[2]);
 }
 
 /* Whether the point's rectangle around the cell is within the bound. Where there is no point there is nothing to mend. */
@@ -108,31 +137,53 @@ static int is_within(const struct cutting *c, const struct dpoint_cell *cell, co
 	       bound_holds(c->view, extent, cover->error, NULL);
 }
 
+/* The normal that shading has; 0 where there is none. */
+static void normal_at(double normal[3], const struct cutting *c, const double weight[3])
+{
+	v3d_scale(normal, c->corner[0]->normal, weight[0]);
+	v3d_add_scaled(normal, normal, weight[1], c->corner[1]->normal);
+	v3d_add_scaled(normal, normal, weight[2], c->corner[2]->normal);
+	v3d_normalize(normal, normal);
+}
+
+/* Whether normals turn by too much along a side. */
+static int turns(const struct cutting *c, const struct piece *p)
+{
+	double normal[4][3], weight[4][3];
+
+	if (p->size <= c->least_turned)
+		return 0;
+	weigh_corners(weight, c, p);
+	for (int i = 0; i < 4; i++)
+		normal_at(normal[i], c, weight[i]);
+	for (int i = 0; i < 4; i++)
+		if (v3d_dot(normal[i], normal[(i + 1) % 4]) < c->least_cosine)
+			return 1;
+	return 0;
+}
+
 /* Makes the cell and the shape in its middle. Returns 0 where that cannot be told: then the cell has no normal. */
 static int cell_of(struct dpoint_cell *cell, struct dpoint_local *local, const struct cutting *c, const struct piece *p)
 {
-	static const uint32_t square[4][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } };
-	static const uint32_t triangle[4][2] = { { 0, 0 }, { 1, 0 }, { 0, 1 }, { 0, 1 } };
-	const uint32_t (*corner)[2] = is_triangle(c, p) ? triangle : square;
-	double weight[3], place[3];
+	double weight[4][3], place[3];
 	int is_good;
 
+	weigh_corners(weight, c, p);
 	for (int i = 0; i < 4; i++) {
-		weigh(weight, c, p->x + corner[i][0] * p->size, p->y + corner[i][1] * p->size);
-		place_at(place, c, weight);
+		place_at(place, c, weight[i]);
 		for (int k = 0; k < 3; k++)
 			cell->corner[i][k] = (float)place[k];
 	}
 	memset(cell->normal, 0, sizeof cell->normal);
 	cell->part = c->material;
-	weigh_middle(weight, c, p);
-	is_good = local_at(local, c, weight);
+	weigh_middle(weight[0], c, p);
+	is_good = local_at(local, c, weight[0]);
 	for (int k = 0; k < 3 && is_good; k++)
 		cell->normal[k] = (float)local->axis[2][k];
 	return is_good;
 }
 
-/* The piece, or its quarters where the bound asks for smaller ones. */
+/* The piece, or its quarters where normals turn too much, or the bound asks for smaller ones. */
 static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
 {
 	const float delta = c->options->delta;
@@ -144,11 +195,11 @@ static int put(const struct cutting *c, const struct piece *p, uint64_t attr)
 	int rc = PSR_OK;
 
 	made.attr = attr;
-	if (c->view != NULL && half > 0 && is_good && !is_within(c, &made, &local, &like)) {
+	if (half > 0 && is_good && (turns(c, p) || (c->view != NULL && !is_within(c, &made, &local, &like)))) {
 		for (uint32_t i = 0; i < 4 && rc == PSR_OK; i++) {
 			const struct piece part = { p->x + (i & 1) * half, p->y + (i >> 1) * half, half };
 
-			if (part.x + part.y + part.size <= units_of(c))
+			if (!is_beyond(c, &part))
 				rc = put(c, &part, attr);
 		}
 		return rc;
@@ -214,7 +265,7 @@ static int gather(struct seen *seen, const struct cutting *c, const struct piece
 	struct piece part[4];
 	int rc = PSR_OK;
 
-	if (p->x + p->y + p->size > units_of(c)) {
+	if (is_beyond(c, p)) {
 		*seen = (struct seen){ .kind = SEEN_BEYOND };
 		return PSR_OK;
 	}
@@ -237,7 +288,7 @@ int cut(const struct cutting *c)
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < c->n; i++)
-		for (uint32_t j = 0; i + j < c->n && rc == PSR_OK; j++) {
+		for (uint32_t j = 0; i + c->ratio * j < c->n && rc == PSR_OK; j++) {
 			const struct piece piece = { i * size, j * size, size };
 			struct seen seen;
 
@@ -249,25 +300,53 @@ int cut(const struct cutting *c)
 }
 
 /* A flat rectangle around a cell of this size reaches beyond a border by less than the error. */
-static double finest_of(const struct dpoint_cover_options *cover)
+static double finest_of(const struct cutting *c)
 {
-	return fmax(0.25 * (double)cover->error, (double)cover->slack);
+	const struct dpoint_cover_options *cover = c->options->cover;
+	const double turned = c->options->turn > 0 ? c->options->cell * TURNED : INFINITY;
+
+	return c->view == NULL ? turned : fmin(turned, fmax(0.25 * (double)cover->error, (double)cover->slack));
+}
+
+/* A narrow triangle has fewer parts across: pieces shall not be narrow. */
+static void plan_ratio(struct cutting *c, const double length[3])
+{
+	const double x = length[c->apex], y = length[(c->apex + 2) % 3];
+	const uint32_t across = (uint32_t)fmax(fmin(ceil(fmin(x, y) / c->options->cell), c->n), 1);
+
+	c->along = (c->apex + 1) % 3;
+	c->ratio = 1;
+	if (ceil(fmax(x, y) / c->options->cell) < 2 * across)
+		return;
+	c->along = (c->apex + (x < y ? 2 : 1)) % 3;
+	c->ratio = (c->n + across - 1) / across;
+	c->n = across * c->ratio;
+}
+
+static void plan_turn(struct cutting *c, double most)
+{
+	double sine;
+
+	psr_sincos(fmin(c->options->turn, 3), &sine, &c->least_cosine);
+	c->least_turned = UINT32_MAX;
+	if (c->options->turn > 0 && most > 0)
+		c->least_turned = (uint32_t)fmin(c->options->cell * TURNED / most * units_of(c), MOST_UNITS);
 }
 
 double cut_plan(struct cutting *c, unsigned is_open)
 {
 	const double cell = c->options->cell, grain = c->options->grain_of != NULL ? c->options->grain_of[c->material] : 0;
-	double most = 0, followed = -1, n;
+	double length[3], most = 0, followed = -1, n;
 
 	c->side = c->apex = 0;
 	for (int i = 0; i < 3; i++) {
-		double along[3], length, rank;
+		double along[3], rank;
 
 		v3d_sub(along, c->corner[(i + 1) % 3]->at, c->corner[i]->at);
-		length = v3d_length(along);
-		rank = length + (is_open >> i & 1 ? 1e30 : 0);
-		if (length > most) {
-			most = length;
+		length[i] = v3d_length(along);
+		rank = length[i] + (is_open >> i & 1 ? 1e30 : 0);
+		if (length[i] > most) {
+			most = length[i];
 			c->apex = (i + 2) % 3;
 		}
 		if (rank > followed) {
@@ -277,11 +356,13 @@ double cut_plan(struct cutting *c, unsigned is_open)
 	}
 	n = fmax(ceil(most / cell), 1);
 	c->n = (uint32_t)fmin(n, CUT_MOST_PARTS);
+	plan_ratio(c, length);
 	c->grains = 1;
 	while (grain > 0 && c->n * c->grains < CUT_MOST_PARTS && most / ((double)c->n * c->grains) > 1.5 * grain)
 		c->grains *= 2;
 	c->units = 1;
-	while (c->view != NULL && units_of(c) < MOST_UNITS && most / units_of(c) > finest_of(c->options->cover))
+	while (units_of(c) < MOST_UNITS && most / units_of(c) > finest_of(c))
 		c->units *= 2;
+	plan_turn(c, most);
 	return grain > 0 ? fmax(n, ceil(most / (3 * grain))) : n;
 }

@@ -19,6 +19,7 @@
 struct search {
 	struct bars bars;
 	float free[2];  /* half-sides of a rectangle that is known to have none */
+	float overhang; /* less than a rectangle is wide: one that ends nowhere across would end nowhere along */
 	int left;       /* how many nodes may still be looked at; below 0: there may be more bars */
 	size_t backing; /* is_backed() */
 };
@@ -47,7 +48,7 @@ static int is_crossing(struct search *s, const struct fitting *f, const struct r
                        float radius)
 {
 	const float away = sqrtf(middle[0] * middle[0] + middle[1] * middle[1]);
-	const float beyond = away > 0 ? 1 + (radius + f->overhang) / away : 1;
+	const float beyond = away > 0 ? 1 + (radius + s->overhang) / away : 1;
 
 	return !f->look.surface->is_cloud && is_backed(&s->backing, &f->look, r, middle[0], middle[1]) &&
 	       is_backed(&s->backing, &f->look, r, middle[0] * beyond, middle[1] * beyond);
@@ -81,7 +82,7 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 		rectangle_sees(corner[c], r, cell->corner[c]);
 		v3f_add_scaled(middle, middle, 0.25f, corner[c]);
 	}
-	if (is_beyond((const float (*)[3])corner, r, f->overhang) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
+	if (is_beyond((const float (*)[3])corner, r, s->overhang) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
 		return;
 	off = fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1]));
 	if (off > 2 * radius + 4 * r->height || rectangle_suits_off(&f->look, r, cell, middle, off))
@@ -90,7 +91,7 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 		above[c] = fabsf(corner[c][2] - dpoint_height_at(r->lambda_u, r->rho, corner[c][0], corner[c][1]));
 	bar = bar_of((const float (*)[3])corner, above, r->height);
 	for (int k = 0; k < 2; k++)
-		bar.at[k] += f->overhang;
+		bar.at[k] += s->overhang;
 	if (bar.at[0] >= r->extent[0] || bar.at[1] >= r->extent[1] || bars_is_behind(&s->bars, bar.at[0], bar.at[1]) ||
 	    is_crossing(s, f, r, middle, radius))
 		return;
@@ -126,7 +127,7 @@ static void look_below(struct search *s, const struct fitting *f, const struct r
 	size_t near;
 
 	if (sight->is_out || s->left < 0 ||
-	    bars_is_behind(&s->bars, (u > 0 ? u : 0) + f->overhang, (v > 0 ? v : 0) + f->overhang))
+	    bars_is_behind(&s->bars, (u > 0 ? u : 0) + s->overhang, (v > 0 ? v : 0) + s->overhang))
 		return;
 	if (cell_node_is_leaf(&tree->node[i])) {
 		look_at(s, f, r, &f->look.surface->cell[tree->order[tree->node[i].begin]], sight->radius);
@@ -148,11 +149,12 @@ static int look_around(struct rectangle *r, const float free_one[2], struct sear
 
 	memcpy(s->free, free_one, sizeof s->free);
 	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
+	s->overhang = fminf(f->overhang, 0.5f * fminf(r->extent[0], r->extent[1]));
 	s->bars.n = 0;
 	s->left = f->looked - 1;
 	see(&all, s, r, &f->look.tree->ball[0]);
 	look_below(s, f, r, 0, &all);
-	bars_end(r->extent, &s->bars, s->free, f->overhang);
+	bars_end(r->extent, &s->bars, s->free, s->overhang);
 	return s->left >= 0;
 }
 
@@ -242,7 +244,7 @@ static void fit(struct dpoint_candidate *c, struct search *s, const struct fitti
 		return;
 	}
 	for (int k = 0; k < 2; k++)
-		if (r.extent[k] < most[k] - f->overhang)
+		if (r.extent[k] < most[k] - s->overhang)
 			c->delta[k] = dpoint_delta_of_class(dpoint_delta_class(r.extent[k]));
 }
 

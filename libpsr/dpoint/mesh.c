@@ -12,6 +12,7 @@
 static int put_strip(const struct cutting *c, int side)
 {
 	const struct corner *a = c->corner[side], *b = c->corner[(side + 1) % 3], *other = c->corner[(side + 2) % 3];
+	const uint32_t n = cut_parts(c, side);
 	double along[3], in[3], out[3], width = c->options->cell;
 
 	v3d_sub(along, b->at, a->at);
@@ -19,13 +20,13 @@ static int put_strip(const struct cutting *c, int side)
 	v3d_add_scaled(out, in, -v3d_dot(in, along) / v3d_dot(along, along), along);
 	if (!(v3d_dot(along, along) > 0) || v3d_normalize(out, out) == 0)
 		return PSR_OK;
-	for (uint32_t i = 0; i < c->n; i++) {
+	for (uint32_t i = 0; i < n; i++) {
 		struct dpoint_cell *cell = dpoint_surface_cell(c->surface);
 
 		if (cell == NULL)
 			return PSR_ERR_MEMORY;
 		for (int p = 0; p < 4; p++) {
-			const double part = (double)(i + (p == 1 || p == 2)) / c->n, away = p < 2 ? 0 : -width;
+			const double part = (double)(i + (p == 1 || p == 2)) / n, away = p < 2 ? 0 : -width;
 
 			for (int k = 0; k < 3; k++)
 				cell->corner[p][k] = (float)(a->at[k] + part * along[k] + away * out[k]);
@@ -79,9 +80,9 @@ static int check(const struct corners *corners, const struct psr_mesh *mesh, con
 		if (cut_plan(&c, 0) > CUT_MOST_PARTS)
 			return psr_fail(err, PSR_ERR_LIMIT, "triangle %u has a side of more than %d pieces of %g; use a lower resolution,"
 			                " or blocks", t, CUT_MOST_PARTS, options->cell);
-		n_pieces += (uint64_t)c.n * (c.n + 1) / 2;
+		n_pieces += (uint64_t)c.n * (c.n / c.ratio + 1) / 2;
 		if (c.grains > 1)
-			n_grains += (uint64_t)c.n * c.grains * c.n * c.grains / 2;
+			n_grains += (uint64_t)c.n * c.grains * (c.n / c.ratio) * c.grains / 2;
 	}
 	if (n_pieces > CUT_MOST_PIECES)
 		return refuse_pieces(options, err);
@@ -100,6 +101,7 @@ static int put_pieces_as_facets(struct dpoint_surface *surface, struct dpoint_su
 	all.surface = pieces;
 	all.view = NULL;
 	cut_plan(&all, 0);
+	all.least_turned = UINT32_MAX;
 	pieces->n_cells = pieces->n_candidates = 0;
 	rc = cut(&all);
 	for (size_t i = 0; i < pieces->n_cells && rc == PSR_OK; i++) {

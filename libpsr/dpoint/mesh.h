@@ -8,6 +8,8 @@
 struct dpoint_mesh_options {
 	double origin[3], scale; /* inner units are (place - origin) * scale */
 	double cell;             /* triangles are cut into cells of sides of at most this, in inner units */
+	double turn;             /* and normals turn by at most this along them, radians, but within a quarter of `cell`; 0: by
+	                          * any angle */
 	float delta;             /* the most that a rectangle may reach: 0 < delta <= 1 */
 	/* How finely looks are seen, by material: pieces whose looks differ by more than `looks` 255ths of a channel (look.h)
 	 * are cut into quarters until they are of this size; 0: not at all. NULL: as if all were 0. */

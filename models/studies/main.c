@@ -103,7 +103,7 @@ static const struct study_kind tables[] = {
 	  "teapot,toybird",
 	  "Pictures of 800x600, as those of dpoint-frames; points, and blocks of as many pixels or more. edges: smoothed;\n"
 	  "pass 1: of 2x2 sub-pixels. kB: in memory. dB: inside the object; bright: of its bright pixels; points': what points\n"
-	  "have more. equal time: the best of the ways that take no longer than points.", NULL },
+	  "have more. best as fine, best of all: of the ways of blocks that take no longer than points.", NULL },
 	{ "dpoint-error", "[K] 7", "differential points within an error", table_dpoint_error, "teapot,top",
 	  "An error is what psr-model build --error asks for, in pixels of the resolution. off by: no drawn place is further\n"
 	  "from the mesh, as is proven; over: points that are further off than asked.", NULL },

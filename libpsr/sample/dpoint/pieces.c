@@ -114,12 +114,18 @@ static void find_looks(struct parts *p)
 		p->part[i].rc = PSR_OK;
 }
 
+/* A point reaches as far as normals turn by twice as much to either side. */
+static double turn_of(const struct parts *p)
+{
+	return 0.5 * (double)p->cover.sine;
+}
+
 static void sample_patch(struct parts *p, struct part *part)
 {
 	const struct psr_model_info *info = p->b->info;
 	const struct dpoint_trimmed_options o = {
 		.origin = { info->origin[0], info->origin[1], info->origin[2] }, .scale = 1 / info->scale,
-		.cell = p->b->options->piece, .turn = 0.5 * (double)p->cover.sine, .delta = p->cover.delta,
+		.cell = p->b->options->piece, .turn = turn_of(p), .delta = p->cover.delta,
 		.hem = (double)fminf(HEM, 0.5f * p->cover.overhang), .attr = part->attr,
 	};
 
@@ -134,7 +140,7 @@ static void sample_mesh(struct parts *p)
 	struct building *b = p->b;
 	const struct dpoint_mesh_options mesh = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = b->options->piece, .delta = p->cover.delta, .grain_of = b->grain, .cover = &p->cover,
+		.cell = b->options->piece, .turn = turn_of(p), .delta = p->cover.delta, .grain_of = b->grain, .cover = &p->cover,
 		.looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
 	};
 

@@ -1,4 +1,5 @@
 /* A highlight, magnified: points beside blocks that get as much time, as finer models or more sub-pixels. */
+#include <limits.h>
 #include <math.h>
 #include "model/points.h"
 #include "model/tree.h"
@@ -17,23 +18,24 @@ static const struct study_column columns[N_COLUMNS] = {
 	[BRIGHT_GAIN] = { "points'", "bright_gain_db", 2 },
 };
 
-/* The first are points. */
 static const struct setting {
 	const char *name;
-	int finer; /* how many times the study's resolution */
+	int finer; /* how many times the study's resolution; 0: points */
 	enum psr_smooth smooth;
 	unsigned pass;
 } setting[] = {
-	{ "points", 1, PSR_SMOOTH_NONE, 0 },
+	{ "points", 0, PSR_SMOOTH_NONE, 0 },
+	{ "points, pass 1", 0, PSR_SMOOTH_NONE, 1 },
 	{ "blocks", 1, PSR_SMOOTH_NONE, 0 },
 	{ "blocks, edges", 1, PSR_SMOOTH_EDGES, 0 },
 	{ "blocks, pass 1", 1, PSR_SMOOTH_NONE, 1 },
 	{ "2 times as fine", 2, PSR_SMOOTH_NONE, 0 },
 	{ "4 times as fine", 4, PSR_SMOOTH_NONE, 0 },
+	{ "4 times, edges", 4, PSR_SMOOTH_EDGES, 0 },
 	{ "4 times, pass 1", 4, PSR_SMOOTH_NONE, 1 },
 };
 #define N_SETTINGS ((int)(sizeof setting / sizeof *setting))
-#define N_ROWS (N_SETTINGS + 1)
+#define N_ROWS (N_SETTINGS + 2)
 #define N_FINER 3 /* 1, 2 and 4 times */
 
 struct subject {
@@ -49,7 +51,7 @@ static double *value(const struct subject *s, int i, int column)
 
 static struct dpoint_way way_of(const struct subject *s, int i)
 {
-	return (struct dpoint_way){ .model = i == 0 ? s->points : s->blocks[setting[i].finer / 2],
+	return (struct dpoint_way){ .model = setting[i].finer == 0 ? s->points : s->blocks[setting[i].finer / 2],
 		                        .smooth = setting[i].smooth, .pass = setting[i].pass };
 }
 
@@ -73,23 +75,24 @@ static int measure(struct subject *s)
 	return rc;
 }
 
-/* The last row: of the settings of blocks, what is best of those that take no longer than points do. */
-static void compare(struct subject *s)
+/* A last row: of the settings of blocks, at most so many times as fine, what is best of those that take no longer than
+ * points do. */
+static void compare(struct subject *s, int row, int finer)
 {
 	const double least = *value(s, 0, FPS) / AS_LONG;
 
 	for (int column = DB; column <= BRIGHT; column += BRIGHT - DB) {
 		double best = -INFINITY;
 
-		for (int i = 1; i < N_SETTINGS; i++) {
-			*value(s, i, column + 1) = *value(s, 0, column) - *value(s, i, column);
-			if (*value(s, i, FPS) >= least)
+		for (int i = 0; i < N_SETTINGS; i++) {
+			*value(s, i, column + 1) = i > 0 ? *value(s, 0, column) - *value(s, i, column) : NAN;
+			if (setting[i].finer > 0 && setting[i].finer <= finer && *value(s, i, FPS) >= least)
 				best = fmax(best, *value(s, i, column));
 		}
-		*value(s, N_SETTINGS, column) = best;
-		*value(s, N_SETTINGS, column + 1) = *value(s, 0, column) - best;
+		*value(s, row, column) = best;
+		*value(s, row, column + 1) = *value(s, 0, column) - best;
 	}
-	*value(s, N_SETTINGS, FPS) = *value(s, 0, FPS);
+	*value(s, row, FPS) = *value(s, 0, FPS);
 }
 
 static int build(struct subject *s, const struct study_model *of)
@@ -115,15 +118,18 @@ static int run_model(void *subject, struct study_model *of, int row)
 
 	s->row = row;
 	for (int i = 0; i < N_ROWS; i++)
-		study_label(&study->table, s->row + i, "%.20s, %s", of->name, i < N_SETTINGS ? setting[i].name : "equal time");
+		study_label(&study->table, s->row + i, "%.20s, %s", of->name,
+		            i < N_SETTINGS ? setting[i].name : i == N_SETTINGS ? "best as fine" : "best of all");
 	if (rc == PSR_OK)
 		rc = build(s, of);
 	if (rc == PSR_OK)
 		rc = dpoint_view_set(&s->view, high / MAGNIFICATION, 1);
 	if (rc == PSR_OK)
 		rc = measure(s);
-	if (rc == PSR_OK)
-		compare(s);
+	if (rc == PSR_OK) {
+		compare(s, N_SETTINGS, 1);
+		compare(s, N_SETTINGS + 1, INT_MAX);
+	}
 	psr_model_unref(s->points);
 	s->points = NULL;
 	for (int i = 0; i < N_FINER; i++) {

@@ -7,7 +7,7 @@
 
 #define DPOINT_VIEW_WIDTH 800
 #define DPOINT_VIEW_HEIGHT 600
-#define DPOINT_VIEW_MOST_WAYS 8
+#define DPOINT_VIEW_MOST_WAYS 12
 #define DPOINT_VIEW_WHOLE 2.3 /* radii across which the whole model is in the picture */
 #define DPOINT_VIEW_ROUGHNESS 0.25f
 

@@ -83,7 +83,6 @@ static void a_rectangle_ends_at_an_acute_edge(void **state)
 	}
 	assert_int_equal(dpoint_fit(&surface, &options, NULL, NULL), PSR_OK);
 	for (size_t i = 0; i < surface.n_candidates / 2; i++) {
-if (i % 61 == 0) print_message("%g %g %g delta %g %g reach %g\n", surface.candidate[i].point.at[0],surface.candidate[i].point.at[1],surface.candidate[i].point.at[2], surface.candidate[i].delta[0],surface.candidate[i].delta[1], reach(&surface.candidate[i], 0));
 		n_near += reach(&surface.candidate[i], 0) > -1.0 / 64 - (double)OVERHANG;
 		/* A place is a float of about 1. */
 		assert_true(reach(&surface.candidate[i], 0) <= (double)OVERHANG + 1e-6);
@@ -121,11 +120,37 @@ static void samples_whose_rectangles_are_small_come_by_cells(void **state)
 	}
 }
 
+/* Two steps of a stair, of 1/8 by 1/2, that go up by 0.1. Rectangles narrower than the overhang end before the riser, as
+ * all do: but for the overhang, and a cell of 1/512 beside it. */
+static void a_rectangle_narrower_than_the_overhang_ends_along_its_length(void **state)
+{
+	struct dpoint_surface surface;
+
+	(void)state;
+	dpoint_surface_init(&surface);
+	add_plane(&surface, (const double[3]){ -0.125, 0, 0 }, (const double[3]){ 0.125, 0, 0 }, (const double[3]){ 0, 0.5, 0 });
+	add_plane(&surface, (const double[3]){ 0, 0, 0 }, (const double[3]){ 0, 0, 0.1 }, (const double[3]){ 0, 0.5, 0 });
+	for (size_t i = 0; i < surface.n_candidates; i++) {
+		struct dpoint_candidate *c = &surface.candidate[i];
+		float v[3];
+		int across;
+
+		v3f_cross(v, c->point.normal, c->point.u);
+		across = fabsf(c->point.u[1]) > fabsf(v[1]) ? 0 : 1;
+		c->delta[across] = dpoint_delta_of_class(dpoint_delta_class(0.8f * OVERHANG));
+	}
+	assert_int_equal(dpoint_fit(&surface, &options, NULL, NULL), PSR_OK);
+	for (size_t i = 0; i < surface.n_candidates / 2; i++)
+		assert_true(reach(&surface.candidate[i], 0) <= (double)OVERHANG + 1e-6);
+	dpoint_surface_fini(&surface);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sheets_that_cross_end_no_rectangle),
 		cmocka_unit_test(a_rectangle_ends_at_an_acute_edge),
+		cmocka_unit_test(a_rectangle_narrower_than_the_overhang_ends_along_its_length),
 		cmocka_unit_test(samples_whose_rectangles_are_small_come_by_cells),
 	};
 

@@ -275,6 +275,96 @@ static void mending_leaves_no_hole(void **state)
 	free(m);
 }
 
+static double area_of(const struct dpoint_cell *cell)
+{
+	double sum[3] = { 0, 0, 0 };
+
+	for (int i = 1; i < 3; i++) {
+		double a[3], b[3], n[3];
+
+		for (int k = 0; k < 3; k++) {
+			a[k] = (double)cell->corner[i][k] - (double)cell->corner[0][k];
+			b[k] = (double)cell->corner[i + 1][k] - (double)cell->corner[0][k];
+		}
+		v3d_cross(n, a, b);
+		v3d_add_scaled(sum, sum, 0.5, n);
+	}
+	return v3d_length(sum);
+}
+
+/* A triangle of sides 1 and 1/100 is cut along the long ones alone, into 101 parts: the longest is a little over 1. One of
+ * 1 and 0.035 has four rows of 104, 78, 52 and 26. Areas are the triangle's; places are floats of at most 1. */
+static void narrow_triangles_have_pieces_that_are_not(void **state)
+{
+	static const struct narrow {
+		double across;
+		size_t n;
+	} narrow[] = { { 0.01, 101 }, { 0.035, 260 } };
+	struct grid_mesh *m = malloc(sizeof *m);
+
+	(void)state;
+	assert_non_null(m);
+	for (size_t i = 0; i < 2; i++)
+		for (int turned = 0; turned < 6; turned++) {
+			const double at[3][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, narrow[i].across, 0 } };
+			struct dpoint_surface surface;
+			double area = 0;
+			size_t n = 0;
+
+			for (int k = 0; k < 3; k++) {
+				memcpy(m->position[k], at[turned < 3 ? (k + turned) % 3 : (turned - k) % 3], sizeof at[0]);
+				v3f_set(m->normal[k], 0, 0, 1);
+				m->triangle[0][k] = (uint32_t)k;
+			}
+			use(m, 3, 1);
+			sample(&surface, m, 0.01, 0.1f);
+			for (size_t c = 0; c < surface.n_cells; c++) {
+				if (surface.cell[c].part == DPOINT_BEYOND)
+					continue;
+				area += area_of(&surface.cell[c]);
+				n++;
+			}
+			assert_int_equal(n, narrow[i].n);
+			assert_true(fabs(area - 0.5 * narrow[i].across) <= 1e-6 * narrow[i].across + (double)n * 1e-8);
+			dpoint_surface_fini(&surface);
+		}
+	free(m);
+}
+
+/* A torus whose tube has a radius of 0.4: normals turn by 0.1 along 0.04 of it, and along 0.14 of its outside, which is
+ * 1.4 away from the axis. Cells of 0.2 are cut until their sides are no longer, or to a quarter: 0.05, whose diagonal is
+ * 1.42 times as long. */
+static void pieces_are_cut_where_normals_turn(void **state)
+{
+	const double turn = 0.1;
+	struct grid_mesh *m = malloc(sizeof *m);
+	size_t n[2];
+
+	(void)state;
+	assert_non_null(m);
+	round_mesh(m, 1, 40);
+	for (int k = 0; k < 2; k++) {
+		const struct dpoint_mesh_options options = { .scale = 1, .cell = 0.2, .delta = 0.1f, .turn = k * turn };
+		struct dpoint_surface surface;
+
+		dpoint_surface_init(&surface);
+		assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &options, NULL), PSR_OK);
+		n[k] = surface.n_cells;
+		for (size_t c = 0; c < surface.n_cells && k == 1; c++)
+			for (int i = 0; i < 4; i++) {
+				double side[3];
+
+				for (int j = 0; j < 3; j++)
+					side[j] = (double)surface.cell[c].corner[(i + 1) % 4][j] - (double)surface.cell[c].corner[i][j];
+				/* Chords of 1/40 of a turn bend normals by up to 1.01 of what the torus does. */
+				assert_true(v3d_length(side) <= 1.01 * 1.4 * turn || v3d_length(side) <= 0.2 / 4 * 1.5);
+			}
+		dpoint_surface_fini(&surface);
+	}
+	assert_true(n[1] > 2 * n[0]);
+	free(m);
+}
+
 static void too_many_pieces_are_refused(void **state)
 {
 	const struct dpoint_mesh_options options = { .scale = 1, .cell = 1e-5, .delta = 1 };
@@ -329,6 +419,8 @@ int main(void)
 		cmocka_unit_test(under_a_fitted_rectangle_normals_are_within_the_angle),
 		cmocka_unit_test(two_turns_cover_all_with_little_more),
 		cmocka_unit_test(mending_leaves_no_hole),
+		cmocka_unit_test(narrow_triangles_have_pieces_that_are_not),
+		cmocka_unit_test(pieces_are_cut_where_normals_turn),
 		cmocka_unit_test(too_many_pieces_are_refused),
 		cmocka_unit_test(what_is_too_much_is_refused_before_it_is_cut),
 	};
