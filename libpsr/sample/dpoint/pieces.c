@@ -12,6 +12,7 @@
 #include "surface/texture.h"
 
 #define HEM 1e-4f         /* twice of what rims of patches are off at most (import/cad) */
+#define TURN 0.6          /* of epsilon's sine: normals turn by so much along the side of a mesh's piece (0155) */
 #define MARGIN 0.08f      /* of points of patches: from 2 degrees aslant no step between flat ones shows (0139) */
 
 /* The look of a place in the middle of a piece, filtered over the piece; *attr without a normal. */
@@ -114,12 +115,6 @@ static void find_looks(struct parts *p)
 		p->part[i].rc = PSR_OK;
 }
 
-/* A point reaches as far as normals turn by twice as much to either side. */
-static double turn_of(const struct parts *p)
-{
-	return 0.5 * (double)p->cover.sine;
-}
-
 static void sample_patch(struct parts *p, struct part *part)
 {
 	const struct psr_model_info *info = p->b->info;
@@ -140,7 +135,8 @@ static void sample_mesh(struct parts *p)
 	struct building *b = p->b;
 	const struct dpoint_mesh_options mesh = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
-		.cell = b->options->piece, .turn = turn_of(p), .delta = p->cover.delta, .grain_of = b->grain, .cover = &p->cover,
+		.cell = b->options->piece, .turn = TURN * (double)p->cover.sine, .delta = p->cover.delta, .grain_of = b->grain,
+		.cover = &p->cover,
 		.looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
 	};
 
