@@ -283,8 +283,10 @@ static int join(uint8_t **bytes, size_t *n_bytes, struct packing *p)
 	at = *bytes = malloc(*n_bytes);
 	if (at == NULL)
 		return PSR_ERR_MEMORY;
-	at = put(at, (uint64_t)p->tree->levels | (uint64_t)p->packing << 8 | (uint64_t)p->cut << 16
-	             | (uint64_t)chunk_streams(p->tree) << 24, 4);
+	at = put(at, (uint64_t)p->tree->levels, 1);
+	at = put(at, p->packing == OCTREE_FAST ? CHUNKS_WAY_FAST : CHUNKS_WAY_SMALL, 1);
+	at = put(at, (uint64_t)p->cut, 1);
+	at = put(at, chunk_streams(p->tree), 1);
 	at = put(at, p->n_chunks, 4);
 	at = put(at, (uint64_t)p->n_steps, 8);
 	for (int s = 0; s < p->n_steps; s++) {

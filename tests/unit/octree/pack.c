@@ -137,6 +137,26 @@ static void what_is_cut_short_or_longer_is_refused(void **state)
 	}
 }
 
+/* A coder's end could leave some of its last bits open. */
+static void the_last_bytes_have_one_value(void **state)
+{
+	(void)state;
+	for (enum octree_packing packing = OCTREE_FAST; packing <= OCTREE_SMALL; packing++) {
+		struct octree *tree = make(6, 40);
+		uint8_t *bytes;
+		size_t n;
+
+		assert_int_equal(octree_pack(&bytes, &n, tree, packing, NULL, NULL), PSR_OK);
+		for (int bit = 0; bit < 32; bit++) {
+			bytes[n - 1 - bit / 8] ^= (uint8_t)(1 << bit % 8);
+			assert_int_equal(unpack(bytes, n, UINT64_MAX), PSR_ERR_FORMAT);
+			bytes[n - 1 - bit / 8] ^= (uint8_t)(1 << bit % 8);
+		}
+		free(bytes);
+		octree_destroy(tree);
+	}
+}
+
 static void a_header_that_lies_is_refused(void **state)
 {
 	struct octree *tree = make(9, 200);
@@ -217,6 +237,7 @@ int main(void)
 		cmocka_unit_test(threads_pack_the_same_bytes_and_unpack_the_same_tree),
 		cmocka_unit_test(surfaces_pack_well),
 		cmocka_unit_test(what_is_cut_short_or_longer_is_refused),
+		cmocka_unit_test(the_last_bytes_have_one_value),
 		cmocka_unit_test(a_header_that_lies_is_refused),
 		cmocka_unit_test(bits_of_a_small_chance_come_back_wherever_they_stand),
 		cmocka_unit_test(a_tree_takes_only_its_own_bytes),
