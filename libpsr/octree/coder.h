@@ -76,8 +76,8 @@ static inline void coder_open(struct coder *c, const uint8_t *bytes, size_t n)
 		c->code = c->code << 8 | coder_get_byte(c);
 }
 
-/* Returns whether the stream ended where it should, as coder_end() ends it: with all of `low`, from which `code` counts.
- * So no bit of it may have another value. */
+/* Returns whether the stream ended where it should, and as coder_end() ends it: with all of `low`, from which `code`
+ * counts. So no bit may have another value. */
 static inline int coder_is_at_end(const struct coder *c)
 {
 	return !c->has_failed && c->n == c->room && c->code == 0;

@@ -1,8 +1,8 @@
 #include <string.h>
 #include "codes.h"
 
-/* Each bit of a code by five contexts, each with a probability of its own, and where codes are hard to foretell by a sum
- * of what each neighbour adds. Their logits are weighed, and the weights learn, too. Integers alone. */
+/* Each bit of a code by five contexts, each with a probability of its own, and where codes are hard to foretell by a
+ * sum of what each neighbour adds. Their logits are weighed, and the weights learn, too. Integers alone. */
 #define CONTEXTS 5
 #define INPUTS (CONTEXTS + 2) /* their logits, a constant, and the sum */
 #define A_BITS 14
@@ -146,7 +146,7 @@ ALWAYS int32_t held(int64_t x, int32_t most)
 /* What is around an octant. */
 struct around {
 	uint32_t there;  /* which neighbours its node has, and itself: a constant */
-	uint64_t window; /* which children are known to be there: 3x3x3 of the neighbourhood's 4x4x4, itself in the middle */
+	uint64_t window; /* known children: 3x3x3 of the neighbourhood's 4x4x4, itself in the middle */
 };
 
 static int32_t sum_parts(const struct sum *sum, const struct around *around)

@@ -1,8 +1,8 @@
 /* Octrees from clouds and meshes: octree [-n MILLIONS] [-m MB] [-l LEVELS] [-w FILE.las] [FILE]
  *
  * Without a file it makes one: a terrain of hills and trees at survey coordinates, in the random order of no scanner.
- * -w keeps that file. Prints time and peak of memory of building, bits a leaf beside those of Draco, and rates of
- * packing. Times are of the processor. */
+ * -w keeps that file. Prints its entropy, time and peak of memory of building, bits a leaf beside those of Draco, and
+ * rates of packing. Times are of the processor. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,13 +35,22 @@ static void put_double(uint8_t *p, double x)
 	put(p, bits, 8);
 }
 
+static double ground_at(double x, double y)
+{
+	return 40.0 * sin(x / 170.0) * cos(y / 130.0) + 6.0 * sin(x / 19.0 + y / 23.0);
+}
+
+static int has_trees(double x, double y)
+{
+	return sin(x / 7.0) * sin(y / 9.0) > 0.3;
+}
+
 /* A place of a square kilometre in millimetres, with 3 cm of noise; one of four is in a tree. */
 static void make_point(uint8_t p[RECORD], uint64_t *random)
 {
 	const double x = random_in(random, 0.0, 1000.0), y = random_in(random, 0.0, 1000.0);
-	const double ground = 40.0 * sin(x / 170.0) * cos(y / 130.0) + 6.0 * sin(x / 19.0 + y / 23.0);
-	const int is_tree = random_below(random, 4) == 0 && sin(x / 7.0) * sin(y / 9.0) > 0.3;
-	const double z = ground + (is_tree ? random_in(random, 2.0, 15.0) : random_in(random, -0.03, 0.03));
+	const int is_tree = random_below(random, 4) == 0 && has_trees(x, y);
+	const double z = ground_at(x, y) + (is_tree ? random_in(random, 2.0, 15.0) : random_in(random, -0.03, 0.03));
 
 	memset(p, 0, RECORD);
 	put(p, (uint64_t)(int64_t)(x * 1000.0), 4);
@@ -78,6 +87,53 @@ static int make_file(const char *path, uint64_t n)
 		fwrite(point, 1, sizeof point, file);
 	}
 	return fclose(file) == 0;
+}
+
+/* ---- what no coder can do without ---- */
+
+#define COLUMNS 512 /* of cells, either way, that stand for all */
+#define PLACES 8    /* of a column, either way */
+#define DEEPEST 15
+
+/* Adds so many points, spread evenly from one height to another, to the cells of a column. */
+static void spread_points(double *cells, double n, double from, double to, double edge)
+{
+	for (int z = (int)(from / edge); z * edge < to; z++)
+		cells[z] += n * (fmin(to, (z + 1) * edge) - fmax(from, z * edge)) / (to - from);
+}
+
+/* Prints the entropy of which cells have one of n points, to who knows all that make_point() does but its draws. */
+static void print_bound(double n, int levels)
+{
+	static double cells[1 << DEEPEST];
+	const double edge = 1000.0 / (1 << levels), each = n * 1e-6 * edge * edge / (PLACES * PLACES);
+	double bits = 0.0, leaves = 0.0;
+
+	if (levels > DEEPEST)
+		return;
+	for (int c = 0; c < COLUMNS * COLUMNS; c++) {
+		const double at[2] = { (c % COLUMNS) * (1000.0 / COLUMNS), (int)(c / COLUMNS) * (1000.0 / COLUMNS) };
+		double low = 1e9, high = 0.0;
+
+		for (int i = 0; i < PLACES * PLACES; i++) {
+			const double x = at[0] + (i % PLACES + 0.5) / PLACES * edge;
+			const double y = at[1] + ((int)(i / PLACES) + 0.5) / PLACES * edge;
+			const double ground = 64.0 + ground_at(x, y), trees = has_trees(x, y) ? 0.25 : 0.0;
+
+			spread_points(cells, each * (1.0 - trees), ground - 0.03, ground + 0.03, edge);
+			spread_points(cells, each * trees, ground + 2.0, ground + 15.0, edge);
+			low = fmin(low, ground - 0.03);
+			high = fmax(high, ground + 15.0);
+		}
+		for (int z = (int)(low / edge); z * edge < high; z++) {
+			const double none = exp(-cells[z]), some = 1.0 - none;
+
+			bits -= cells[z] > 0.0 && some > 0.0 ? some * log2(some) + none * log2(none) : 0.0;
+			leaves += some;
+			cells[z] = 0.0;
+		}
+	}
+	printf("%-8s %6.2f bits a leaf to who knows how the cloud is made\n", "entropy", bits / leaves);
 }
 
 static double used_seconds(void)
@@ -300,6 +356,8 @@ int main(int argc, char **argv)
 	octree_build_options_default(&options);
 	options.levels = levels;
 	options.memory = memory << 20;
+	if (optind >= argc)
+		print_bound((double)n * 1e6, levels);
 	rc = octree_source_suits(path) ? measure_cloud(path, &options, &err) : measure_mesh(path, &options, &err);
 	if (!is_kept)
 		unlink(path);
