@@ -48,11 +48,11 @@ struct psr_model *octree_packed_part(size_t *n, const struct octree_packed *pack
 	return psr_model_parse(&part, packed->bytes, *n, NULL) == PSR_OK ? part : NULL;
 }
 
-/* Puts down what the first bytes of the file are; nothing where they are no model. */
+/* Puts down what the first bytes of the file are; nothing where they are no model. whole_db: of all of them. */
 static int put_part(struct study *study, int row, const struct study_model *of,
-                    const struct octree_packed *packed, const struct octree_truth *truth)
+                    const struct octree_packed *packed, const struct octree_truth *truth, double whole_db)
 {
-	struct octree_drawn drawn[2];
+	struct octree_drawn drawn;
 	size_t n;
 	struct psr_model *part = octree_packed_part(&n, packed, octree_parts[row % OCTREE_PARTS]);
 	int rc;
@@ -60,17 +60,16 @@ static int put_part(struct study *study, int row, const struct study_model *of,
 	*study_at(&study->table, row, 0, CAME) = (double)n * 1e-6;
 	if (part == NULL)
 		return PSR_OK;
-	const struct octree_way way[] = { { .model = part }, { .model = packed->whole } };
-	rc = octree_compare(drawn, study, of, way, 2, truth);
+	rc = octree_compare(&drawn, study, of, &(struct octree_way){ .model = part }, 1, truth);
 	*study_at(&study->table, row, 0, DEPTH) = psr_model_octree(part)->levels;
 	*study_at(&study->table, row, 0, POINTS) = (double)psr_model_octree(part)->n_leaves * 1e-6;
 	psr_model_unref(part);
 	if (rc != PSR_OK)
 		return rc;
-	*study_at(&study->table, row, 0, FPS) = drawn[0].fps;
-	*study_at(&study->table, row, 0, DB) = drawn[0].db;
-	*study_at(&study->table, row, 0, BELOW) = drawn[1].db - drawn[0].db;
-	*study_at(&study->table, row, 0, WRONG) = drawn[0].wrong;
+	*study_at(&study->table, row, 0, FPS) = drawn.fps;
+	*study_at(&study->table, row, 0, DB) = drawn.db;
+	*study_at(&study->table, row, 0, BELOW) = whole_db - drawn.db;
+	*study_at(&study->table, row, 0, WRONG) = drawn.wrong;
 	return PSR_OK;
 }
 
@@ -78,14 +77,17 @@ static int run_model(struct study *study, int m)
 {
 	const struct study_model *of = &study->model[m];
 	struct octree_packed packed = { .bytes = NULL };
+	struct octree_drawn whole = { 0 };
 	struct octree_truth truth;
 	int rc = octree_truth_init(&truth, study, of);
 
 	if (rc == PSR_OK)
 		rc = octree_packed_make(&packed, study, of, LEVELS);
+	if (rc == PSR_OK)
+		rc = octree_compare(&whole, study, of, &(struct octree_way){ .model = packed.whole }, 1, &truth);
 	for (int p = 0; rc == PSR_OK && p < OCTREE_PARTS; p++) {
 		study_label(&study->table, m * OCTREE_PARTS + p, "%.20s %u %%", of->name, octree_parts[p]);
-		rc = put_part(study, m * OCTREE_PARTS + p, of, &packed, &truth);
+		rc = put_part(study, m * OCTREE_PARTS + p, of, &packed, &truth, whole.db);
 		study_step(study, of->name);
 	}
 	octree_packed_fini(&packed);
