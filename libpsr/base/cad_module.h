@@ -4,6 +4,7 @@
 #define PSR_BASE_CAD_MODULE_H
 
 #include <stdint.h>
+#include <stdlib.h>
 #include "psr/error.h"
 #include "psr/mesh.h"
 
@@ -27,7 +28,7 @@ struct cad_module_mesh {
 	uint32_t (*triangle)[3]; /* n_triangles, counter-clockwise seen from the outside */
 	uint32_t *color_of;      /* n_triangles, < n_colors */
 	float (*color)[4];       /* linear; alpha -1: the file has none for these faces */
-	uint32_t n_faces, n_left_out; /* faces of the file; those that could not be cut into triangles */
+	uint32_t n_faces, n_left_out; /* faces of the file; those that could not be cut into triangles with an area */
 	uint32_t n_patches;
 	struct psr_patch *patch; /* n_patches; what they point at is from malloc(); material: < n_colors */
 	uint32_t *patch_of;      /* n_triangles: of the triangle's face, or UINT32_MAX; NULL: there are no patches */
@@ -36,6 +37,17 @@ struct cad_module_mesh {
 	char first_left_out[128]; /* the first one's number, and its part's name; printable */
 };
 
+/* Frees what a patch points at, on either side of the door: patches may pass through it. */
+static inline void cad_patch_free(struct psr_patch *patch)
+{
+	free(patch->knot[0]);
+	free(patch->knot[1]);
+	free(patch->control);
+	free(patch->corner);
+	free(patch->triangle);
+	free(patch->rim);
+}
+
 /* The types of the module's functions. Reads a file; *out is the caller's, for the function below. FORMAT, LIMIT,
  * MEMORY; then `message` says why, in a few words. */
 typedef int cad_module_read(struct cad_module_mesh **out, const struct cad_module_source *source, char *message,
@@ -43,7 +55,7 @@ typedef int cad_module_read(struct cad_module_mesh **out, const struct cad_modul
 typedef void cad_module_destroy(struct cad_module_mesh *mesh); /* NULL is fine */
 
 /* The module exports one of these, named psr_cad_module. Raise the version with every change of this file. */
-#define CAD_MODULE_VERSION 2
+#define CAD_MODULE_VERSION 3
 struct cad_module {
 	uint32_t version; /* CAD_MODULE_VERSION of the module's own build; first in every version */
 	cad_module_read *read;

@@ -339,14 +339,8 @@ extern "C" void cad_destroy(cad_module_mesh *mesh)
 	std::free(mesh->triangle);
 	std::free(mesh->color_of);
 	std::free(mesh->color);
-	for (uint32_t i = 0; i < mesh->n_patches; i++) {
-		std::free(mesh->patch[i].knot[0]);
-		std::free(mesh->patch[i].knot[1]);
-		std::free(mesh->patch[i].control);
-		std::free(mesh->patch[i].corner);
-		std::free(mesh->patch[i].triangle);
-		std::free(mesh->patch[i].rim);
-	}
+	for (uint32_t i = 0; i < mesh->n_patches; i++)
+		cad_patch_free(&mesh->patch[i]);
 	std::free(mesh->patch);
 	std::free(mesh->patch_of);
 	std::free(mesh);

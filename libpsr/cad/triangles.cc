@@ -27,6 +27,14 @@ bool normal_at(cad_vertex &vertex, const BRepAdaptor_Surface &surface, const gp_
 	return true;
 }
 
+bool has_area(const Poly_Triangulation &mesh, int t)
+{
+	int corner[3];
+	mesh.Triangle(t).Get(corner[0], corner[1], corner[2]);
+	const gp_Vec a(mesh.Node(corner[0]), mesh.Node(corner[1])), b(mesh.Node(corner[0]), mesh.Node(corner[2]));
+	return !(a.Crossed(b).Magnitude() <= 0); // one that is not finite is told elsewhere
+}
+
 double dot(const std::array<float, 3> &a, const std::array<float, 3> &b)
 {
 	return static_cast<double>(a[0]) * b[0] + static_cast<double>(a[1]) * b[1] + static_cast<double>(a[2]) * b[2];
@@ -38,7 +46,10 @@ bool cad_triangles::add(const TopoDS_Face &face, uint32_t color)
 {
 	TopLoc_Location location;
 	const Handle(Poly_Triangulation) mesh = BRep_Tool::Triangulation(face, location);
-	if (mesh.IsNull() || mesh->NbTriangles() == 0)
+	int first_there = 1;
+	while (!mesh.IsNull() && first_there <= mesh->NbTriangles() && !has_area(*mesh, first_there))
+		first_there++;
+	if (mesh.IsNull() || first_there > mesh->NbTriangles())
 		return false;
 	if (static_cast<uint64_t>(mesh->NbTriangles()) + triangle.size() > max_triangles)
 		throw cad_failure(PSR_ERR_LIMIT, "more than " + std::to_string(max_triangles) + " triangles");

@@ -30,7 +30,7 @@ struct cad_triangles {
 	uint64_t max_triangles;
 
 	// Appends a face that has been meshed, with its location. Returns false, and appends nothing, if it has no
-	// triangles. Throws cad_failure LIMIT.
+	// triangle with an area. At poles others have none. Throws cad_failure LIMIT.
 	bool add(const TopoDS_Face &face, uint32_t color);
 
 	// Makes normals of vertices at one place equal where they nearly are: across smooth joints of faces.

@@ -32,6 +32,7 @@ struct import_mesh {
 	struct psr_import_options options;
 	uint64_t vertex_capacity, triangle_capacity, point_capacity;
 	uint64_t n_pixels;
+	int is_cut; /* triangles are not the file's own: those without an area, at poles, are left out untold */
 };
 
 int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err); /* with the default options */

@@ -2,19 +2,14 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/cad_module.h"
 #include "dpoint/patch.h"
 #include "import.h"
 
 void import_patches_destroy(struct psr_patch *patch, uint32_t n)
 {
-	for (uint32_t i = 0; i < n; i++) {
-		free(patch[i].knot[0]);
-		free(patch[i].knot[1]);
-		free(patch[i].control);
-		free(patch[i].corner);
-		free(patch[i].triangle);
-		free(patch[i].rim);
-	}
+	for (uint32_t i = 0; i < n; i++)
+		cad_patch_free(&patch[i]);
 	free(patch);
 }
 

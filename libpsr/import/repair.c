@@ -64,6 +64,7 @@ static void drop_triangles(struct import_mesh *im)
 		}
 	}
 	mesh->n_triangles = kept;
+	n_flat = im->is_cut ? 0 : n_flat;
 	mesh->n_dropped_triangles += n_flat + n_infinite;
 	if (n_flat > 0)
 		import_mesh_warn(im, "faces without area were left out: %u", n_flat);

@@ -161,6 +161,7 @@ static int take(struct import_mesh *im, struct cad_module_mesh *cad, struct psr_
 	struct psr_mesh *mesh = im->mesh;
 	int rc = add_materials(im, cad, err);
 
+	im->is_cut = 1;
 	if (rc == PSR_OK)
 		rc = import_mesh_grow(im, cad->n_vertices, cad->n_triangles, 0, err);
 	if (rc != PSR_OK)

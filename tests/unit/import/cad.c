@@ -94,6 +94,24 @@ static void iges_has_places_normals_and_colors(void **state)
 	check_pins("tests/data/import/pins.iges", 1e-5);
 }
 
+/* At a ball's poles triangles have no area: the file's one face has, and nothing of it is left out. */
+static void poles_are_no_faces_without_area(void **state)
+{
+	struct psr_import_options options;
+	struct psr_mesh *mesh = NULL;
+
+	(void)state;
+	if (!has_module)
+		skip();
+	psr_import_options_default(&options);
+	options.has_patches = 1;
+	assert_int_equal(psr_mesh_import(&mesh, "tests/data/import/ball.step", &options, NULL), PSR_OK);
+	assert_int_equal(mesh->n_patches, 1);
+	assert_int_equal(mesh->n_dropped_triangles, 0);
+	assert_string_equal(mesh->warning, "");
+	psr_mesh_destroy(mesh);
+}
+
 /* Deflection is absolute: four times as fine takes twice the sides, once the angle does not decide any more. */
 static void a_finer_model_has_more_triangles(void **state)
 {
@@ -238,6 +256,7 @@ int main(void)
 		cmocka_unit_test(without_the_module_it_is_named), /* first: it is loaded once */
 		cmocka_unit_test(step_has_places_normals_and_colors),
 		cmocka_unit_test(iges_has_places_normals_and_colors),
+		cmocka_unit_test(poles_are_no_faces_without_area),
 		cmocka_unit_test(a_finer_model_has_more_triangles),
 		cmocka_unit_test(faces_are_patches_on_request),
 		cmocka_unit_test(a_file_that_ends_in_the_middle_is_told),
