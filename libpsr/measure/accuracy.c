@@ -67,7 +67,7 @@ static int find_neighbors(const struct measure *m, uint32_t x, uint32_t y, struc
 	return n;
 }
 
-static int is_hole(const struct measure *m, double z, const struct neighbor *neighbor, int n)
+static int is_behind(const struct measure *m, double z, const struct neighbor *neighbor, int n)
 {
 	for (int i = 0; i < n; i++) {
 		double cosine = fmin(1, neighbor[i].cosine), slope = sqrt(1 - cosine * cosine) / cosine;
@@ -76,6 +76,15 @@ static int is_hole(const struct measure *m, double z, const struct neighbor *nei
 			return 0;
 	}
 	return 1;
+}
+
+/* Nine rays tell most pixels. An outline may pass between them, and what is drawn there is what lies beside it: so rays
+ * all over the neighbourhood look for it. */
+static int is_hole(const struct measure *m, uint32_t x, uint32_t y, const struct neighbor neighbor[9])
+{
+	const double z = (double)m->depth[(size_t)y * m->width + x];
+	return is_behind(m, z, neighbor, 9) &&
+	       !truth_reaches(m->truth, &m->view, x - 1.0, y - 1.0, 3, z - HOLE_SPACINGS * m->spacing);
 }
 
 /* Returns the distance along the truth's normal to the nearest truth beside the point, else to the nearest of all. */
@@ -111,7 +120,7 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 	count->n_truth += isfinite(m->truth_depth[at]) != 0;
 	count->n_inside += (uint64_t)is_inside;
 	count->n_inside_empty += (uint64_t)(is_inside && !is_drawn);
-	count->n_holes += (uint64_t)(is_inside && (!is_drawn || is_hole(m, (double)m->depth[at], neighbor, n)));
+	count->n_holes += (uint64_t)(is_inside && is_hole(m, x, y, neighbor));
 	if (is_drawn && n == 0)
 		count->n_outside_drawn += (uint64_t)is_outside(m, x, y);
 	if (is_drawn && n != 0) {

@@ -43,8 +43,8 @@ struct psr_accuracy {
 	uint64_t n_outside_drawn;/* drawn more than a pixel outside of the silhouette: no ray of the 3x3 neighbourhood
 	                          * meets it */
 	uint64_t n_inside_empty; /* pixels inside that the frame left empty */
-	uint64_t n_holes;        /* pixels inside that are empty, or behind every surface point of the 3x3 neighbourhood by
-	                          * over `tolerance` */
+	uint64_t n_holes;        /* pixels inside that are behind every surface point of the 3x3 neighbourhood by over
+	                          * `tolerance`, or empty, though no ray of it misses the object */
 	uint64_t n_compared;     /* drawn pixels with truth in their 3x3 neighbourhood */
 	/* In units of spacing, from the point of the pixel's centre ray at the frame's depth: along the normal of the
 	 * nearest of the surfaces that the centre rays of the 3x3 neighbourhood meet, or to the nearest point of the mesh

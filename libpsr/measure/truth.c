@@ -16,6 +16,7 @@
 
 #define MOST_SIDE 64
 #define RUN 64 /* rays traced together */
+#define REACH_SIDE 60
 
 struct psr_truth {
 	const struct psr_mesh *mesh;
@@ -100,6 +101,21 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 		truth_trace(truth, ray, side, view->near_z, hit);
 		for (int i = 0; i < side; i++)
 			if (hit[i].prim != RAY_NONE)
+				return 1;
+	}
+	return 0;
+}
+
+int truth_reaches(const struct psr_truth *truth, const struct view *view, double x, double y, int n, double z)
+{
+	struct ray ray[REACH_SIDE];
+	struct ray_hit hit[REACH_SIDE];
+	for (int j = 0; j < REACH_SIDE; j++) {
+		for (int i = 0; i < REACH_SIDE; i++)
+			truth_ray(truth, view, x + (i + 0.5) / REACH_SIDE * n, y + (j + 0.5) / REACH_SIDE * n, &ray[i]);
+		truth_trace(truth, ray, REACH_SIDE, view->near_z, hit);
+		for (int i = 0; i < REACH_SIDE; i++)
+			if (hit[i].prim == RAY_NONE ? isinf(z) : hit[i].t * truth->scale >= z)
 				return 1;
 	}
 	return 0;

@@ -9,6 +9,9 @@
 /* Returns whether any of side * side rays, spread over the n * n pixels from (x, y) on, meets the object. */
 int truth_is_met(const struct psr_truth *truth, const struct view *view, double x, double y, int n, int side);
 
+/* Returns whether any of 60 * 60 rays, spread likewise, meets a surface at depth z or behind; z infinite: meets nothing. */
+int truth_reaches(const struct psr_truth *truth, const struct view *view, double x, double y, int n, double z);
+
 /* Finds the light that arrives where rays through n points (x, y in pixels) of the picture first meet the object.
  * `facing`: the cosine between the light and the face's normal on the visible side; -2: the ray meets nothing. */
 struct truth_light {

@@ -15,12 +15,19 @@ static float depth_of(uint64_t word)
 	return psr_float_from_bits((uint32_t)(word >> 32));
 }
 
-/* Adds the pixel, unless it is known. Returns 0 if there is no room. */
-static int add(struct crack *c, uint32_t x, uint32_t y)
+static int has(const struct crack *c, uint32_t x, uint32_t y)
 {
 	for (int k = 0; k < c->n; k++)
 		if (c->at[k][0] == x && c->at[k][1] == y)
 			return 1;
+	return 0;
+}
+
+/* Adds the pixel, unless it is known. Returns 0 if there is no room. */
+static int add(struct crack *c, uint32_t x, uint32_t y)
+{
+	if (has(c, x, y))
+		return 1;
 	if (c->n == CRACK_MOST)
 		return 0;
 	c->at[c->n][0] = x;
@@ -50,10 +57,34 @@ static int look_around(struct crack *c, const struct plan *plan, const struct ps
 	return 1;
 }
 
+/* The depth of the first pixel of a direction that is not of the crack. */
+static float depth_beside(const struct crack *c, const struct psr_zstack *stack, const uint32_t at[2], int dx, int dy)
+{
+	uint32_t x = at[0], y = at[1];
+
+	while (has(c, x, y)) {
+		x += (uint32_t)dx;
+		y += (uint32_t)dy;
+	}
+	return depth_of(psr_zstack_row(stack, y)[x]);
+}
+
+static int goes_on(const struct crack *c, const struct psr_zstack *stack, int k, float most)
+{
+	static const int way[4][2] = { { 1, 0 }, { 0, 1 }, { 1, 1 }, { 1, -1 } };
+
+	for (int w = 0; w < 4; w++)
+		if (fabsf(depth_beside(c, stack, c->at[k], way[w][0], way[w][1]) -
+		          depth_beside(c, stack, c->at[k], -way[w][0], -way[w][1])) <= most)
+			return 1;
+	return 0;
+}
+
 int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
 {
 	const float own = depth_of(psr_zstack_row(stack, y)[x]);
 	struct crack c = { .at = { { x, y } }, .n = 1, .nearest = UINT64_MAX };
+	float spacing, apart, step;
 	uint32_t instance;
 
 	for (int k = 0; k < c.n; k++)
@@ -62,6 +93,15 @@ int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_
 	if (c.nearest == UINT64_MAX)
 		return 0;
 	instance = plan_find_instance(plan, (uint32_t)c.nearest / PSR_BLOCK_SAMPLES);
-	return plan->warp[instance].points != NULL && c.farthest - depth_of(c.nearest) <=
-	       (c.n > CRACK_SHORT ? CRACK_APART / 2 : CRACK_APART) * plan->instance[instance].level_spacing;
+	if (plan->warp[instance].points == NULL)
+		return 0;
+	spacing = plan->instance[instance].level_spacing;
+	apart = (c.n > CRACK_SHORT ? CRACK_APART / 4 : CRACK_APART) * spacing;
+	step = (c.n > 1 ? CRACK_STEP : CRACK_STEP_ALONE) * spacing;
+	if (c.farthest - depth_of(c.nearest) > apart)
+		return 0;
+	for (int k = 0; k < c.n; k++)
+		if (!goes_on(&c, stack, k, step))
+			return 0;
+	return 1;
 }

@@ -92,6 +92,23 @@ static void empty_and_far_pixels_inside_are_holes(void **state)
 	assert_float_equal(a.distance_max, 1 / SPACING, 1e-3);
 }
 
+/* All nine centre rays of pixel 7 meet the square, whose outline is at column 6.4, in the first of its neighbours. */
+static void an_outline_between_centres_is_no_hole(void **state)
+{
+	struct fixture *f = *state;
+	struct psr_accuracy a;
+
+	f->depth[30 * SIDE + 7] = INFINITY; /* as beyond the outline */
+	a = measure(f);
+	assert_int_equal(a.n_inside_empty, 1);
+	assert_int_equal(a.n_holes, 0);
+	f->depth[32 * SIDE + 8] = INFINITY; /* its neighbourhood is whole */
+	f->depth[34 * SIDE + 7] = 6;        /* nothing is there */
+	a = measure(f);
+	assert_int_equal(a.n_inside_empty, 2);
+	assert_int_equal(a.n_holes, 2);
+}
+
 static void only_what_is_over_a_pixel_away_is_outside(void **state)
 {
 	struct fixture *f = *state;
@@ -167,6 +184,7 @@ int main(void)
 		TEST(the_truth_itself_is_perfect),
 		TEST(distances_count_in_spacings_along_the_normal),
 		TEST(empty_and_far_pixels_inside_are_holes),
+		TEST(an_outline_between_centres_is_no_hole),
 		TEST(only_what_is_over_a_pixel_away_is_outside),
 		TEST(a_slope_is_no_hole),
 		TEST(colors_are_compared_within_a_pixel),

@@ -124,7 +124,7 @@ static void rims_are_near_to_each_other(void **state)
 		int closes;
 	} cases[] = {
 		{ CRACK_SHORT, CRACK_APART - 0.1f, 1 }, { CRACK_SHORT, CRACK_APART + 0.1f, 0 },
-		{ CRACK_SHORT + 1, CRACK_APART / 2 - 0.1f, 1 }, { CRACK_SHORT + 1, CRACK_APART / 2 + 0.1f, 0 },
+		{ CRACK_SHORT + 1, CRACK_APART / 4 - 0.1f, 1 }, { CRACK_SHORT + 1, CRACK_APART / 4 + 0.1f, 0 },
 	};
 
 	(void)state;
@@ -134,6 +134,31 @@ static void rims_are_near_to_each_other(void **state)
 			for (uint32_t x = 0; x < WIDTH; x++)
 				set_depth(x, y, NEAR_Z + cases[i].apart * SPACING);
 		open_slit(cases[i].length, 60, 20, 1, 0, 2 * NEAR_Z);
+		assert_int_equal(count_closed(1), cases[i].closes ? cases[i].length : 0);
+	}
+}
+
+/* On a ramp of a a column and three times as much a line, what is on both sides of a pixel differs by 2a along the row
+ * and by more along all other ways; by 3a with two pixels in a row. All around is apart by 9a at most. */
+static void a_surface_goes_on_across_a_crack(void **state)
+{
+	const struct {
+		uint32_t length;
+		float step; /* spacings */
+		int closes;
+	} cases[] = {
+		{ 1, CRACK_STEP_ALONE - 0.1f, 1 }, { 1, CRACK_STEP_ALONE + 0.1f, 0 },
+		{ 2, CRACK_STEP - 0.1f, 1 }, { 2, CRACK_STEP + 0.1f, 0 },
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+		const float a = cases[i].step * SPACING / (float)(cases[i].length + 1);
+
+		for (uint32_t y = 0; y < HEIGHT; y++)
+			for (uint32_t x = 0; x < WIDTH; x++)
+				set_depth(x, y, NEAR_Z + a * (float)x + 3 * a * (float)y);
+		open_slit(cases[i].length, 60, 20, 1, 0, INFINITY);
 		assert_int_equal(count_closed(1), cases[i].closes ? cases[i].length : 0);
 	}
 }
@@ -153,6 +178,7 @@ int main(void)
 		cmocka_unit_test(slits_of_all_directions_close),
 		cmocka_unit_test(what_is_long_or_wide_stays_open),
 		cmocka_unit_test(rims_are_near_to_each_other),
+		cmocka_unit_test(a_surface_goes_on_across_a_crack),
 		cmocka_unit_test(blocks_have_no_cracks),
 	};
 
