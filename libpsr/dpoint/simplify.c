@@ -119,21 +119,24 @@ static int two_turns(struct dpoint_surface *surface, struct dpoint_cover *cover,
 }
 
 int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
-                    const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool)
+                    const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool,
+                    const struct psr_cancel *cancel)
 {
-	const struct dpoint_work work = { pool, NULL };
+	const struct dpoint_work work = { pool, cancel };
 	const size_t n = surface->n_candidates;
 	int rc;
 
 	memset(choice, 0, sizeof *choice);
 	surface->n_candidates = 0;
-	rc = dpoint_cover_init(cover, surface, options, pool, NULL);
+	rc = dpoint_cover_init(cover, surface, options, pool, cancel);
 	surface->n_candidates = n;
 	if (rc == PSR_OK && cover->tree != NULL)
 		rc = two_turns(surface, cover, sparse, options, &work);
 	if (rc == PSR_OK)
-		rc = dpoint_mend(surface, cover, options, pool, NULL);
+		rc = dpoint_mend(surface, cover, options, pool, cancel);
 	if (rc == PSR_OK)
 		rc = dpoint_choose(choice, cover);
+	if (rc == PSR_OK && psr_is_cancelled(cancel))
+		rc = PSR_ERR_CANCELLED;
 	return rc == PSR_OK ? seal(surface, choice, cover, options, &work) : rc;
 }

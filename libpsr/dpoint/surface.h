@@ -149,7 +149,8 @@ void dpoint_choice_fini(struct dpoint_choice *choice);
  * are much closer than their rectangles are wide, which takes so much less time.
  * MEMORY, CANCELLED; the caller ends cover and choice even then. */
 int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
-                    const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool);
+                    const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool,
+                    const struct psr_cancel *cancel);
 
 /* ---- how good a choice is ---- */
 

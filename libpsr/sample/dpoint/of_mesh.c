@@ -89,6 +89,8 @@ static int choose(struct building *b, struct dpoint_set *set, struct dpoint_buil
 	building_say(b, "choose");
 	rc = dpoint_finish(set, report, &b->surface, b->two_sided, b->options);
 	report->n_flat = b->n_flat;
+	if (rc == PSR_ERR_CANCELLED)
+		return psr_fail(b->err, rc, "cancelled");
 	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "no memory for the points of %zu pieces", b->surface.n_cells);
 }
 
@@ -104,7 +106,7 @@ int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, st
 
 	cover_options.margin = surface->margin;
 	cover_options.is_two_sided = two_sided;
-	rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool);
+	rc = dpoint_simplify(&choice, &cover, surface, &cover_options, SPARSE, options->pool, options->cancel);
 
 	if (rc == PSR_OK)
 		rc = dpoint_set_make(set, &(struct dpoint_grouping){ surface, &choice, cover_options.sine, two_sided });

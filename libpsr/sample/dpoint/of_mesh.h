@@ -17,6 +17,7 @@ struct dpoint_build_options {
 	double error;        /* above 0: a bound in pixels of the resolution, see dpoint_of_mesh(); 3.55e-5 of the resolution
 	                      * at least, 1 of it at most. Epsilon, delta, height are then lowered where it asks for that */
 	struct psr_pool *pool; /* may be NULL */
+	const struct psr_cancel *cancel; /* asked between pieces of work; may be NULL */
 	/* Called before each step; total is 1. May be NULL. */
 	void (*on_progress)(const char *stage, uint64_t done, uint64_t total, void *userdata);
 	void *userdata;
@@ -52,12 +53,12 @@ struct dpoint_build_report {
  * the same side; then, too, it is seen from its outside alone.
  *
  * ARG: options out of range, no extent; FORMAT: nothing is opaque, or no point of a cloud has a surface around it; LIMIT:
- * as of dpoint_sample_mesh(), or more than DPOINT_MOST_CLOUD points; MEMORY. */
+ * as of dpoint_sample_mesh(), or more than DPOINT_MOST_CLOUD points; MEMORY; CANCELLED. */
 int dpoint_of_mesh(struct dpoint_set *set, struct psr_model_info *info, struct dpoint_build_report *report,
                    const struct psr_mesh *mesh, const struct dpoint_build_options *options, struct psr_error *err);
 
 /* The end of it: makes the set of a surface's choice, and its greatest error. two_sided: by part, or NULL. MEMORY,
- * LIMIT. */
+ * LIMIT, CANCELLED. */
 int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, struct dpoint_surface *surface,
                   const uint8_t *two_sided, const struct dpoint_build_options *options);
 

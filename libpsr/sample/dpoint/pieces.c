@@ -213,8 +213,8 @@ int building_put_mesh(struct building *b)
 	if (rc != PSR_OK)
 		return rc;
 	find_looks(&parts);
-	psr_pool_for(b->options->pool, 1 + (int)parts.n, sample, &parts);
-	rc = join(&parts);
+	rc = psr_pool_for_until(b->options->pool, b->options->cancel, 1 + (int)parts.n, sample, &parts);
+	rc = rc == PSR_OK ? join(&parts) : psr_fail(b->err, rc, "cancelled");
 	parts_fini(&parts);
 	if (rc == PSR_OK && b->surface.n_candidates == 0)
 		rc = psr_fail(b->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", b->mesh->n_triangles);

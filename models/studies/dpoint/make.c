@@ -54,7 +54,7 @@ int study_dpoint_make(struct study_dpoint *made, const struct study *study, cons
 	dpoint_surface_init(&made->surface);
 	rc = sample(&made->surface, study, of, side, is_simplified);
 	if (rc == PSR_OK && is_simplified)
-		rc = dpoint_simplify(&made->choice, &made->cover, &made->surface, &fitted, SPARSE, study->pool);
+		rc = dpoint_simplify(&made->choice, &made->cover, &made->surface, &fitted, SPARSE, study->pool, NULL);
 	else if (rc == PSR_OK)
 		rc = study_dpoint_keep_all(&made->choice, made->surface.n_candidates);
 	return rc == PSR_OK ? rc : psr_fail(study->err, rc, "the points of %s cannot be made", of->name);

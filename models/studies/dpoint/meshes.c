@@ -37,7 +37,7 @@ static int measure(double value[N_COLUMNS], const struct study_model *model, str
 	dpoint_surface_init(&surface);
 	rc = dpoint_sample_mesh(&surface, model->mesh, &mesh, study->err);
 	value[PIECES] = (double)surface.n_candidates;
-	if (rc == PSR_OK && (rc = dpoint_simplify(&choice, &cover, &surface, &with, 4, study->pool)) != PSR_OK)
+	if (rc == PSR_OK && (rc = dpoint_simplify(&choice, &cover, &surface, &with, 4, study->pool, NULL)) != PSR_OK)
 		psr_fail(study->err, rc, "no memory for the points of %s", model->name);
 	if (rc == PSR_OK) {
 		value[SECONDS] = clock_seconds() - start;

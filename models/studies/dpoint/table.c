@@ -99,7 +99,7 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 	dpoint_surface_init(&surface);
 	rc = sample_teapot(&surface, row);
 	if (rc == PSR_OK && row->way == FITTED)
-		rc = dpoint_simplify(&choice, &cover, &surface, &options, row->sparse, study->pool);
+		rc = dpoint_simplify(&choice, &cover, &surface, &options, row->sparse, study->pool, NULL);
 	else if (rc == PSR_OK)
 		rc = dpoint_cover_init(&cover, &surface, &options, study->pool, NULL);
 	if (rc == PSR_OK && row->way != FITTED)

@@ -238,7 +238,7 @@ static void two_turns_cover_all_with_little_more(void **state)
 
 		dpoint_surface_init(&surface);
 		assert_int_equal(dpoint_sample_uniform(&surface, &torus.patch, &uniform), PSR_OK);
-		assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &options, i == 0 ? 1 : 4, NULL), PSR_OK);
+		assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &options, i == 0 ? 1 : 4, NULL, NULL), PSR_OK);
 		assert_int_equal(choice.n_holes, 0);
 		n_kept[i] = choice.n_kept;
 		assert_true(i == 0 ? surface.n_candidates >= 4096 : surface.n_candidates < 2048);

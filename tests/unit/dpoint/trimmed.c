@@ -217,7 +217,7 @@ static void choose(struct chosen *c, const struct trimmed *t)
 	c->options = (struct dpoint_cover_options){ .sine = dpoint_sine(0.01), .slack = 2e-5f, .angle = (float)(2 * PSR_DEGREE),
 		                                        .height = 1e-3f, .overhang = OVERHANG, .margin = 0.08f, .delta = 0.125f };
 	sample(&c->surface, t, 0.02);
-	assert_int_equal(dpoint_simplify(&c->choice, &c->cover, &c->surface, &c->options, 4, NULL), PSR_OK);
+	assert_int_equal(dpoint_simplify(&c->choice, &c->cover, &c->surface, &c->options, 4, NULL, NULL), PSR_OK);
 }
 
 static void chosen_fini(struct chosen *c)

@@ -26,7 +26,7 @@ static inline void points_of_patch(struct dpoint_set *set, const struct dpoint_p
 
 	dpoint_surface_init(&surface);
 	assert_int_equal(dpoint_sample_uniform(&surface, patch, &uniform), PSR_OK);
-	assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &options, 1, NULL), PSR_OK);
+	assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &options, 1, NULL, NULL), PSR_OK);
 	for (size_t i = 0; i < surface.n_candidates; i++)
 		surface.candidate[i].point.attr = attr;
 	assert_int_equal(dpoint_set_make(set, &(struct dpoint_grouping){ &surface, &choice, options.sine, NULL }), PSR_OK);

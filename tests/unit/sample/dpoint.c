@@ -175,12 +175,130 @@ static void what_cannot_be_is_refused(void **state)
 	psr_mesh_destroy(mesh);
 }
 
+#define TILES 12
+
+static void *copy_of(const void *from, size_t n)
+{
+	void *to = malloc(n);
+
+	memcpy(to, from, n);
+	return to;
+}
+
+/* A row of humps, each a biquadratic patch with two triangles; their heights differ. */
+static struct psr_mesh *humps(void)
+{
+	static const double knot[6] = { 0, 0, 0, 1, 1, 1 }, corner[4][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } };
+	static const uint32_t half[2][3] = { { 0, 1, 2 }, { 0, 2, 3 } };
+	static const uint8_t rim[2] = { 9 * 3, 9 * 6 }; /* sides 0 and 1, and 1 and 2 */
+	double position[4 * TILES][3];
+	uint32_t triangle[2 * TILES][3];
+	struct psr_mesh *mesh;
+
+	for (uint32_t i = 0; i < TILES; i++) {
+		for (int c = 0; c < 4; c++)
+			v3d_set(position[4 * i + (uint32_t)c], i + corner[c][0], corner[c][1], 0);
+		for (uint32_t t = 0; t < 2; t++)
+			for (int c = 0; c < 3; c++)
+				triangle[2 * i + t][c] = 4 * i + half[t][c];
+	}
+	assert_int_equal(psr_mesh_create(&mesh, (const double(*)[3])position, 4 * TILES, (const uint32_t(*)[3])triangle,
+	                                 2 * TILES, NULL), PSR_OK);
+	mesh->n_patches = TILES;
+	mesh->patch = calloc(TILES, sizeof *mesh->patch);
+	mesh->triangle_patch = malloc(2 * TILES * sizeof *mesh->triangle_patch);
+	for (uint32_t i = 0; i < TILES; i++) {
+		struct psr_patch *p = &mesh->patch[i];
+		double control[9][4];
+
+		for (int k = 0; k < 9; k++) {
+			v3d_set(control[k], i + 0.5 * (k / 3), 0.5 * (k % 3), k == 4 ? 0.1 * (i + 1) : 0);
+			control[k][3] = 1;
+		}
+		*p = (struct psr_patch){ .degree = { 2, 2 }, .n = { 3, 3 }, .n_corners = 4, .n_triangles = 2 };
+		p->knot[0] = copy_of(knot, sizeof knot);
+		p->knot[1] = copy_of(knot, sizeof knot);
+		p->control = copy_of(control, sizeof control);
+		p->corner = copy_of(corner, sizeof corner);
+		p->triangle = copy_of(half, sizeof half);
+		p->rim = copy_of(rim, sizeof rim);
+		mesh->triangle_patch[2 * i] = mesh->triangle_patch[2 * i + 1] = i;
+	}
+	return mesh;
+}
+
+static void patches_are_the_same_by_one_thread_and_by_several(void **state)
+{
+	static const int n_threads[3] = { 1, 2, 5 };
+	struct psr_mesh *mesh = humps();
+	struct dpoint_set set[3];
+
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		struct dpoint_build_options options;
+		struct dpoint_build_report report;
+		struct psr_model_info info = { .scale = 0 };
+
+		dpoint_build_options_default(&options, 128);
+		assert_int_equal(psr_pool_create(&options.pool, n_threads[i], NULL), PSR_OK);
+		assert_int_equal(dpoint_of_mesh(&set[i], &info, &report, mesh, &options, NULL), PSR_OK);
+		psr_pool_destroy(options.pool);
+		assert_true(set[i].n_points > TILES && report.normal_worst > 0.001); /* of the triangles it were 0 */
+		assert_int_equal(set[i].n_points, set[0].n_points);
+		assert_int_equal(set[i].n_groups, set[0].n_groups);
+		assert_memory_equal(set[i].word, set[0].word, set[0].n_points * sizeof *set[0].word);
+		assert_memory_equal(set[i].group, set[0].group, set[0].n_groups * sizeof *set[0].group);
+		assert_int_equal(set[i].delta != NULL, set[0].delta != NULL);
+		if (set[0].delta != NULL)
+			assert_memory_equal(set[i].delta, set[0].delta, set[0].n_points * sizeof *set[0].delta);
+	}
+	for (int i = 0; i < 3; i++)
+		dpoint_set_fini(&set[i]);
+	psr_mesh_destroy(mesh);
+}
+
+static int is_cancelled(void *userdata)
+{
+	return --*(int *)userdata < 0;
+}
+
+/* A patch is an index of a loop, which asks before each: so the first answers end it among patches. */
+static void a_build_can_be_cancelled(void **state)
+{
+	struct psr_mesh *mesh = humps();
+	struct dpoint_build_options options;
+	struct dpoint_build_report report;
+	struct psr_model_info info = { .scale = 0 };
+	struct psr_error err;
+	struct dpoint_set set;
+	int left, n_asked;
+	const struct psr_cancel cancel = { is_cancelled, &left };
+
+	(void)state;
+	dpoint_build_options_default(&options, 128);
+	options.cancel = &cancel;
+	left = 1 << 20;
+	assert_int_equal(dpoint_of_mesh(&set, &info, &report, mesh, &options, &err), PSR_OK);
+	dpoint_set_fini(&set);
+	n_asked = (1 << 20) - left;
+	assert_true(n_asked > 2 * TILES);
+	for (int n = 0; n < n_asked; n += n < 2 * TILES ? 1 : n_asked / 8) {
+		left = n;
+		assert_int_equal(dpoint_of_mesh(&set, &info, &report, mesh, &options, &err), PSR_ERR_CANCELLED);
+		assert_string_equal(err.text, "cancelled");
+		dpoint_set_fini(&set);
+	}
+	psr_mesh_destroy(mesh);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(points_lie_on_the_surface_and_are_few),
 		cmocka_unit_test(an_open_surface_is_seen_from_the_sides_that_its_material_has),
 		cmocka_unit_test(rectangles_end_where_colours_do),
+		cmocka_unit_test(patches_are_the_same_by_one_thread_and_by_several),
+		cmocka_unit_test(a_build_can_be_cancelled),
 		cmocka_unit_test(what_cannot_be_is_refused),
 	};
 

@@ -239,7 +239,7 @@ static void what_cannot_hold_is_counted(void **state)
 	(void)state;
 	dpoint_surface_init(&surface);
 	assert_int_equal(dpoint_sample_mesh(&surface, mesh, &options, NULL), PSR_OK);
-	assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &cover_options, 1, NULL), PSR_OK);
+	assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &cover_options, 1, NULL, NULL), PSR_OK);
 	assert_int_equal(dpoint_bounds_measure(&bounds, &surface, &choice, &cover_options, NULL), PSR_OK);
 	assert_true(bounds.n_over > 0 && bounds.n_over < choice.n_kept);
 	assert_true(bounds.worst > 1e-3 && bounds.worst < 0.1);
