@@ -115,8 +115,8 @@ static const struct study_kind tables[] = {
 	{ "dpoint-holes", "[K] 4.2", "holes between differential points, at magnifications", table_dpoint_holes,
 	  "teapot,gavel,toybird,chair",
 	  "Each magnification has eight views around the model, from all heights. M pixels: whose neighbourhood meets the\n"
-	  "object. Holes are pixels of these that are empty, or show what is more than three samples behind all of the\n"
-	  "neighbourhood's surfaces; blocks: theirs, in the same views.", NULL },
+	  "object. Holes are pixels of these that are empty, though no ray of it misses the object, or show what is more\n"
+	  "than three samples behind all of its surfaces; blocks: theirs, in the same views.", NULL },
 	{ "dpoint-models", "[K] table 1", "differential points: three models", table_dpoint_models, "teapot,gavel",
 	  NOTE_DPOINT_MODELS, NULL },
 	{ "dpoint-meshes", "[K] 4.1", "differential points of meshes", table_dpoint_meshes, "top,teapot,toybird,gavel",
