@@ -96,7 +96,7 @@ int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_
 	if (plan->warp[instance].points == NULL)
 		return 0;
 	spacing = plan->instance[instance].level_spacing;
-	apart = (c.n > CRACK_SHORT ? CRACK_APART / 4 : CRACK_APART) * spacing;
+	apart = (c.n > CRACK_SHORT ? CRACK_APART / 4 : c.n > 1 ? CRACK_APART / 2 : CRACK_APART) * spacing;
 	step = (c.n > 1 ? CRACK_STEP : CRACK_STEP_ALONE) * spacing;
 	if (c.farthest - depth_of(c.nearest) > apart)
 		return 0;

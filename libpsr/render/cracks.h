@@ -12,7 +12,7 @@
  * spacings of the model's resolution. */
 #define CRACK_MOST 12
 #define CRACK_SHORT 4
-#define CRACK_APART 48 /* a quarter of it if the crack is longer than CRACK_SHORT */
+#define CRACK_APART 48 /* of a pixel alone; half of it of a few, a quarter if the crack is longer than CRACK_SHORT */
 #define CRACK_STEP 6   /* across a pixel */
 #define CRACK_STEP_ALONE 10 /* likewise, if it is the only one */
 

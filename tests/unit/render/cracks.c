@@ -123,7 +123,8 @@ static void rims_are_near_to_each_other(void **state)
 		float apart; /* spacings */
 		int closes;
 	} cases[] = {
-		{ CRACK_SHORT, CRACK_APART - 0.1f, 1 }, { CRACK_SHORT, CRACK_APART + 0.1f, 0 },
+		{ 1, CRACK_APART - 0.1f, 1 }, { 1, CRACK_APART + 0.1f, 0 },
+		{ CRACK_SHORT, CRACK_APART / 2 - 0.1f, 1 }, { CRACK_SHORT, CRACK_APART / 2 + 0.1f, 0 },
 		{ CRACK_SHORT + 1, CRACK_APART / 4 - 0.1f, 1 }, { CRACK_SHORT + 1, CRACK_APART / 4 + 0.1f, 0 },
 	};
 
