@@ -30,8 +30,9 @@ static int may_back(const struct standing *s, size_t i)
 	float p[3];
 
 	rectangle_sees(p, s->r, ball->middle);
-	return fabsf(p[0] - s->at[0]) <= ball->radius && fabsf(p[1] - s->at[1]) <= ball->radius &&
-	       fabsf(p[2] - s->at[2]) <= ball->radius + 2 * s->r->height;
+	return fabsf(p[0] - s->at[0]) <= rectangle_reach(s->r, 0, ball) &&
+	       fabsf(p[1] - s->at[1]) <= rectangle_reach(s->r, 1, ball) &&
+	       fabsf(p[2] - s->at[2]) <= rectangle_reach(s->r, 2, ball) + 2 * s->r->height;
 }
 
 static int leaf_backs(const struct standing *s, size_t i)

@@ -82,9 +82,15 @@ static float worth(float u, float v, const float margin[2])
 	return fmaxf(u - margin[0], 0) * fmaxf(v - margin[1], 0);
 }
 
+/* Nothing ends a rectangle that is as narrow as the overhang, so that it is worth nothing either. */
+static float margin_of(float extent, float overhang)
+{
+	return fmaxf(fminf(2 * overhang, extent / 4), fminf(overhang, extent / 2));
+}
+
 void bars_end(float extent[2], const struct bars *bars, const float free_one[2], float overhang)
 {
-	const float margin[2] = { fminf(2 * overhang, extent[0] / 4), fminf(2 * overhang, extent[1] / 4) };
+	const float margin[2] = { margin_of(extent[0], overhang), margin_of(extent[1], overhang) };
 	float v = extent[1], best[2] = { free_one[0], free_one[1] };
 
 	for (size_t i = 0; i <= bars->n; i++) {

@@ -1,5 +1,6 @@
 #include "cell_tree.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include "base/vec.h"
 
@@ -62,7 +63,7 @@ static inline float greater(float a, float b)
 static int bound_places(struct cell_ball *ball, const struct cell_node *node, const struct making *m)
 {
 	float low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
-	float radius2 = 0;
+	float radius2 = 0, half[3] = { 0, 0, 0 };
 	int axis = 0;
 
 	for (uint32_t e = node->begin; e < node->end; e++)
@@ -80,8 +81,11 @@ static int bound_places(struct cell_ball *ball, const struct cell_node *node, co
 
 			v3f_sub(away, m->cell[m->entry[e].cell].corner[c], ball->middle);
 			radius2 = greater(radius2, v3f_dot(away, away));
+			for (int k = 0; k < 3; k++)
+				half[k] = greater(half[k], fabsf(away[k]));
 		}
 	ball->radius = sqrtf(radius2) * 1.00001f;
+	v3f_scale(ball->half, half, 1.00001f);
 	return axis;
 }
 
@@ -130,16 +134,23 @@ static void bound(const struct making *m, size_t i, uint32_t begin, uint32_t end
 		bound_normals(node, m);
 }
 
+static void join_widest(struct cell_ball *ball, size_t i)
+{
+	ball[i].widest = greater(ball[2 * i + 1].widest, ball[2 * i + 2].widest);
+}
+
 static void split(const struct making *m, size_t i, uint32_t begin, uint32_t end)
 {
 	const uint32_t half = begin + (end - begin) / 2;
 	int axis;
 
 	bound(m, i, begin, end, &axis);
+	m->ball[i].widest = m->ball[i].radius;
 	if (end - begin > 1) {
 		select_kth(m->entry, begin, (long)end - 1, half, axis);
 		split(m, 2 * i + 1, begin, half);
 		split(m, 2 * i + 2, half, end);
+		join_widest(m->ball, i);
 	}
 }
 
@@ -206,6 +217,8 @@ int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_
 	} else {
 		split_first(&m, 0, 0, (uint32_t)n);
 		psr_pool_for(pool, PARTS, split_part, &m);
+		for (size_t i = FIRST_PART; i-- > 0;)
+			join_widest(m.ball, i);
 	}
 	for (size_t i = 0; i < n; i++)
 		tree->order[i] = m.entry[i].cell;

@@ -9,9 +9,11 @@
 
 #define CELL_NO_PART UINT32_MAX /* cells of several parts */
 
-/* A sphere that holds the corners of a node's cells: what most questions end with. */
+/* A sphere, and a box along the axes, that each hold the corners of a node's cells: what most questions end with. */
 struct cell_ball {
 	float middle[3], radius;
+	float half[3]; /* of the box's sides; they have the same middle */
+	float widest;  /* of the spheres of its cells alone */
 };
 
 struct cell_node {

@@ -31,8 +31,9 @@ static void search(struct found *found, const struct looking *l, const struct re
 	int is_leaf;
 
 	rectangle_sees(p, r, ball->middle);
-	if (!(fabsf(p[0]) <= r->extent[0] + ball->radius && fabsf(p[1]) <= r->extent[1] + ball->radius &&
-	      fabsf(p[2]) <= r->deep + ball->radius))
+	if (!(fabsf(p[0]) <= r->extent[0] + rectangle_reach(r, 0, ball) &&
+	      fabsf(p[1]) <= r->extent[1] + rectangle_reach(r, 1, ball) &&
+	      fabsf(p[2]) <= r->deep + rectangle_reach(r, 2, ball)))
 		return;
 	is_leaf = cell_node_is_leaf(node);
 	if (is_leaf && !rectangle_covers(l, r, &l->surface->cell[l->tree->order[node->begin]]))

@@ -18,8 +18,11 @@
 /* What a thread looks with. */
 struct search {
 	struct bars bars;
+	float box[3], per_widest[3]; /* where what may end the rectangle is, along x, y and z from its place, and how much
+	                              * further for each unit of a cell's radius */
+	float over[2];  /* how far the rectangle may reach over what ends it: the overhang, or half of a narrow one, which
+	                 * nothing would end otherwise */
 	float free[2];  /* half-sides of a rectangle that is known to have none */
-	float overhang; /* less than a rectangle is wide: one that ends nowhere across would end nowhere along */
 	int left;       /* how many nodes may still be looked at; below 0: there may be more bars */
 	size_t backing; /* is_backed() */
 };
@@ -48,14 +51,14 @@ static int is_crossing(struct search *s, const struct fitting *f, const struct r
                        float radius)
 {
 	const float away = sqrtf(middle[0] * middle[0] + middle[1] * middle[1]);
-	const float beyond = away > 0 ? 1 + (radius + s->overhang) / away : 1;
+	const float beyond = away > 0 ? 1 + (radius + f->overhang) / away : 1;
 
 	return !f->look.surface->is_cloud && is_backed(&s->backing, &f->look, r, middle[0], middle[1]) &&
 	       is_backed(&s->backing, &f->look, r, middle[0] * beyond, middle[1] * beyond);
 }
 
 /* Whether all corners are too far away to end the rectangle. */
-static int is_beyond(const float corner[4][3], const struct rectangle *r, float overhang)
+static int is_beyond(const float corner[4][3], const struct rectangle *r, const float over[2])
 {
 	for (int k = 0; k < 2; k++) {
 		float low = INFINITY, high = -INFINITY;
@@ -64,7 +67,7 @@ static int is_beyond(const float corner[4][3], const struct rectangle *r, float 
 			low = corner[c][k] < low ? corner[c][k] : low;
 			high = corner[c][k] > high ? corner[c][k] : high;
 		}
-		if ((low > 0 ? low : high < 0 ? -high : 0) + overhang >= r->extent[k])
+		if ((low > 0 ? low : high < 0 ? -high : 0) + over[k] >= r->extent[k])
 			return 1;
 	}
 	return 0;
@@ -82,7 +85,7 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 		rectangle_sees(corner[c], r, cell->corner[c]);
 		v3f_add_scaled(middle, middle, 0.25f, corner[c]);
 	}
-	if (is_beyond((const float (*)[3])corner, r, s->overhang) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
+	if (is_beyond((const float (*)[3])corner, r, s->over) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
 		return;
 	off = fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1]));
 	if (off > 2 * radius + 4 * r->height || rectangle_suits_off(&f->look, r, cell, middle, off))
@@ -91,7 +94,7 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 		above[c] = fabsf(corner[c][2] - dpoint_height_at(r->lambda_u, r->rho, corner[c][0], corner[c][1]));
 	bar = bar_of((const float (*)[3])corner, above, r->height);
 	for (int k = 0; k < 2; k++)
-		bar.at[k] += s->overhang;
+		bar.at[k] += s->over[k];
 	if (bar.at[0] >= r->extent[0] || bar.at[1] >= r->extent[1] || bars_is_behind(&s->bars, bar.at[0], bar.at[1]) ||
 	    is_crossing(s, f, r, middle, radius))
 		return;
@@ -100,34 +103,40 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 
 /* A node as the rectangle sees it. */
 struct sight {
-	float p[3], radius, distance2;
+	float p[3], reach[3], radius, distance2;
 	int is_out; /* none of its cells can end the rectangle */
 };
 
 static void see(struct sight *sight, const struct search *s, const struct rectangle *r, const struct cell_ball *ball)
 {
 	float away[3];
-	const float *p = sight->p, radius = ball->radius;
+	const float *p = sight->p, *reach = sight->reach, radius = ball->radius;
 
 	v3f_sub(away, ball->middle, r->at);
+	sight->is_out = 1;
+	for (int k = 0; k < 3; k++)
+		if (!(fabsf(away[k]) <= ball->half[k] + s->box[k] + s->per_widest[k] * ball->widest))
+			return;
 	m3f_apply(sight->p, (const float (*)[3])r->axis, away);
 	sight->radius = radius;
 	sight->distance2 = v3f_dot(away, away);
-	sight->is_out = (fabsf(p[0]) + radius <= s->free[0] && fabsf(p[1]) + radius <= s->free[1]) ||
-	                !(fabsf(p[0]) <= r->extent[0] + radius && fabsf(p[1]) <= r->extent[1] + radius &&
-	                  fabsf(p[2]) <= r->deep + 4 * r->height + 2 * radius);
+	for (int k = 0; k < 3; k++)
+		sight->reach[k] = rectangle_reach(r, k, ball);
+	sight->is_out = (fabsf(p[0]) + reach[0] <= s->free[0] && fabsf(p[1]) + reach[1] <= s->free[1]) ||
+	                !(fabsf(p[0]) <= r->extent[0] + reach[0] && fabsf(p[1]) <= r->extent[1] + reach[1] &&
+	                  fabsf(p[2]) <= r->deep + 4 * r->height + 2 * ball->widest + reach[2]);
 }
 
 static void look_below(struct search *s, const struct fitting *f, const struct rectangle *r, size_t i,
                    const struct sight *sight)
 {
 	const struct cell_tree *tree = f->look.tree;
-	const float u = fabsf(sight->p[0]) - sight->radius, v = fabsf(sight->p[1]) - sight->radius;
+	const float u = fabsf(sight->p[0]) - sight->reach[0], v = fabsf(sight->p[1]) - sight->reach[1];
 	struct sight child[2];
 	size_t near;
 
 	if (sight->is_out || s->left < 0 ||
-	    bars_is_behind(&s->bars, (u > 0 ? u : 0) + s->overhang, (v > 0 ? v : 0) + s->overhang))
+	    bars_is_behind(&s->bars, (u > 0 ? u : 0) + s->over[0], (v > 0 ? v : 0) + s->over[1]))
 		return;
 	if (cell_node_is_leaf(&tree->node[i])) {
 		look_at(s, f, r, &f->look.surface->cell[tree->order[tree->node[i].begin]], sight->radius);
@@ -149,12 +158,17 @@ static int look_around(struct rectangle *r, const float free_one[2], struct sear
 
 	memcpy(s->free, free_one, sizeof s->free);
 	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
-	s->overhang = fminf(f->overhang, 0.5f * fminf(r->extent[0], r->extent[1]));
+	for (int k = 0; k < 3; k++) {
+		const float *u = r->slant[0], *v = r->slant[1], *n = r->slant[2];
+
+		s->box[k] = 1.00001f * (u[k] * r->extent[0] + v[k] * r->extent[1] + n[k] * (r->deep + 4 * r->height));
+		s->per_widest[k] = 1.00001f * (u[k] + v[k] + 2 * n[k]);
+	}
 	s->bars.n = 0;
 	s->left = f->looked - 1;
 	see(&all, s, r, &f->look.tree->ball[0]);
 	look_below(s, f, r, 0, &all);
-	bars_end(r->extent, &s->bars, s->free, s->overhang);
+	bars_end(r->extent, &s->bars, s->free, f->overhang);
 	return s->left >= 0;
 }
 
@@ -214,6 +228,12 @@ static void move(struct dpoint *p, const float by[2])
 	memcpy(p->at, at, sizeof at);
 }
 
+static void set_over(struct search *s, const struct fitting *f, const float extent[2])
+{
+	for (int k = 0; k < 2; k++)
+		s->over[k] = fminf(f->overhang, 0.5f * extent[k]);
+}
+
 /* An extent that bars end becomes that of the class below, and the point moves as much towards the bar: so its
  * rectangle still ends there. What then is in the way makes it shorter, without another move. */
 static void fit(struct dpoint_candidate *c, struct search *s, const struct fitting *f)
@@ -224,6 +244,7 @@ static void fit(struct dpoint_candidate *c, struct search *s, const struct fitti
 
 	rectangle_of(&r, c, f->look.options);
 	memcpy(most, r.extent, sizeof most);
+	set_over(s, f, most);
 	grow(now, side, &r, s, f);
 	if (now[0] >= most[0] && now[1] >= most[1])
 		return;
@@ -239,12 +260,13 @@ static void fit(struct dpoint_candidate *c, struct search *s, const struct fitti
 	move(&c->point, by);
 	rectangle_of(&r, c, f->look.options);
 	memcpy(most, r.extent, sizeof most);
+	set_over(s, f, most);
 	if (!look_around(&r, (const float[2]){ 0, 0 }, s, f)) {
 		c->point = before;
 		return;
 	}
 	for (int k = 0; k < 2; k++)
-		if (r.extent[k] < most[k] - s->overhang)
+		if (r.extent[k] < most[k] - s->over[k])
 			c->delta[k] = dpoint_delta_of_class(dpoint_delta_class(r.extent[k]));
 }
 

@@ -29,6 +29,9 @@ void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const s
 	memcpy(r->axis[0], c->point.u, sizeof r->axis[0]);
 	memcpy(r->axis[2], c->point.normal, sizeof r->axis[2]);
 	v3f_cross(r->axis[1], r->axis[2], r->axis[0]);
+	for (int k = 0; k < 3; k++)
+		for (int i = 0; i < 3; i++)
+			r->slant[k][i] = fabsf(r->axis[k][i]);
 	r->lambda_u = c->point.lambda_u;
 	r->rho = c->point.rho;
 	r->part = c->part;

@@ -16,6 +16,7 @@ void looking_init(struct looking *l, const struct dpoint_surface *surface, const
 
 struct rectangle {
 	float at[3], axis[3][3]; /* u, v, normal */
+	float slant[3][3];       /* of each of them, how far it goes along x, y and z */
 	float extent[2];
 	float deep;              /* how far from the tangent plane any of its cells may be */
 	float height;            /* how far from S_p */
@@ -42,6 +43,12 @@ static inline void rectangle_sees(float at[3], const struct rectangle *r, const 
 
 	v3f_sub(away, p, r->at);
 	m3f_apply(at, (const float (*)[3])r->axis, away);
+}
+
+/* How far the node's box reaches along an axis of the rectangle. */
+static inline float rectangle_reach(const struct rectangle *r, int axis, const struct cell_ball *ball)
+{
+	return v3f_dot(r->slant[axis], ball->half);
 }
 
 /* Whether in the cell's middle, `at` in the rectangle's frame, height and normal are S_p's, and

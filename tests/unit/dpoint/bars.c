@@ -82,11 +82,36 @@ static void the_best_rectangle_has_no_bar_within(void **state)
 	}
 }
 
+/* Cells on an axis of the rectangle end it the overhang away. As narrow as that, it would be a sliver, which they cannot
+ * end in its length. */
+static void a_rectangle_is_no_sliver_along_its_bars(void **state)
+{
+	const float overhang = 5e-4f;
+
+	(void)state;
+	for (int k = 0; k < 2; k++) {
+		struct bars bars = { .bar = NULL };
+		struct bar bar = { .at = { 0 } };
+		float extent[2];
+
+		bar.at[k] = overhang;
+		bar.at[1 - k] = 0.004f;
+		extent[k] = 0.0016f;
+		extent[1 - k] = 0.0442f;
+		bars_put(&bars, &bar);
+		bars_end(extent, &bars, (const float[2]){ 0, 0 }, overhang);
+		assert_float_equal(extent[k], 0.0016f, 0);
+		assert_float_equal(extent[1 - k], 0.004f, 0);
+		free(bars.bar);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(what_is_behind_others_changes_nothing),
 		cmocka_unit_test(the_best_rectangle_has_no_bar_within),
+		cmocka_unit_test(a_rectangle_is_no_sliver_along_its_bars),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
