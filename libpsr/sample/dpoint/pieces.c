@@ -120,7 +120,7 @@ static void sample_patch(struct parts *p, struct part *part)
 	const struct psr_model_info *info = p->b->info;
 	const struct dpoint_trimmed_options o = {
 		.origin = { info->origin[0], info->origin[1], info->origin[2] }, .scale = 1 / info->scale,
-		.cell = p->b->options->piece, .turn = turn_of(p), .delta = p->cover.delta,
+		.cell = p->b->options->piece, .turn = 0.5 * (double)p->cover.sine, .delta = p->cover.delta,
 		.hem = (double)fminf(HEM, 0.5f * p->cover.overhang), .attr = part->attr,
 	};
 
