@@ -113,13 +113,13 @@ static void see(struct sight *sight, const struct search *s, const struct rectan
 	const float *p = sight->p, *reach = sight->reach, radius = ball->radius;
 
 	v3f_sub(away, ball->middle, r->at);
+	sight->distance2 = v3f_dot(away, away);
 	sight->is_out = 1;
 	for (int k = 0; k < 3; k++)
 		if (!(fabsf(away[k]) <= ball->half[k] + s->box[k] + s->per_widest[k] * ball->widest))
 			return;
 	m3f_apply(sight->p, (const float (*)[3])r->axis, away);
 	sight->radius = radius;
-	sight->distance2 = v3f_dot(away, away);
 	for (int k = 0; k < 3; k++)
 		sight->reach[k] = rectangle_reach(r, k, ball);
 	sight->is_out = (fabsf(p[0]) + reach[0] <= s->free[0] && fabsf(p[1]) + reach[1] <= s->free[1]) ||

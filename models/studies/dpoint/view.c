@@ -43,6 +43,7 @@ int dpoint_view_table(struct dpoint_view *view, struct study *study, const struc
 	int rc = study_table_init(&study->table, rows->form, study->n_models * rows->n, 1, study->err);
 
 	*view = (struct dpoint_view){ .study = study };
+	study->keep = NULL; /* of other materials than models of other studies */
 	study->total = study->n_models * rows->n_steps;
 	if (rc == PSR_OK)
 		rc = psr_renderer_create(&study->renderer, study->err);
