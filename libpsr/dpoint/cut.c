@@ -49,18 +49,25 @@ static void basis_along(double axis[3][3], const struct cutting *c, const double
 	v3d_cross(axis[1], axis[2], axis[0]);
 }
 
+/* The normal that shading has. Returns 0 where there is none: then it is 0. */
+static int normal_at(double normal[3], const struct cutting *c, const double weight[3])
+{
+	v3d_set(normal, 0, 0, 0);
+	for (int i = 0; i < 3; i++)
+		v3d_add_scaled(normal, normal, weight[i], c->corner[i]->normal);
+	return v3d_normalize(normal, normal) != 0;
+}
+
 /* Between the corners: the normal that shading has, and the mean of their second forms, seen in its tangent plane. */
 static int local_at(struct dpoint_local *local, const struct cutting *c, const double weight[3])
 {
-	double t[6] = { 0 }, normal[3] = { 0, 0, 0 }, along[2][3];
+	double t[6] = { 0 }, normal[3], along[2][3];
 
 	place_at(local->at, c, weight);
-	for (int i = 0; i < 3; i++) {
-		v3d_add_scaled(normal, normal, weight[i], c->corner[i]->normal);
+	for (int i = 0; i < 3; i++)
 		for (int k = 0; k < 6; k++)
 			t[k] += weight[i] * c->corner[i]->tensor[k];
-	}
-	if (v3d_normalize(normal, normal) == 0)
+	if (!normal_at(normal, c, weight))
 		return 0;
 	basis_along(local->axis, c, normal);
 	for (int i = 0; i < 2; i++) {
@@ -135,15 +142,6 @@ static int is_within(const struct cutting *c, const struct dpoint_cell *cell, co
 	dpoint_candidate_extent(extent, &candidate, cover->sine);
 	return bound_look(c->view, &c->surface->facets, &candidate.point, extent, cover->error) == PSR_OK &&
 	       bound_holds(c->view, extent, cover->error, NULL);
-}
-
-/* The normal that shading has; 0 where there is none. */
-static void normal_at(double normal[3], const struct cutting *c, const double weight[3])
-{
-	v3d_scale(normal, c->corner[0]->normal, weight[0]);
-	v3d_add_scaled(normal, normal, weight[1], c->corner[1]->normal);
-	v3d_add_scaled(normal, normal, weight[2], c->corner[2]->normal);
-	v3d_normalize(normal, normal);
 }
 
 /* Whether normals turn by too much along a side. */

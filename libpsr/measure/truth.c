@@ -91,14 +91,21 @@ double truth_distance(const struct psr_truth *truth, const double point[3], doub
 	return fmin(most, truth->scale * ray_scene_distance(truth->scene, inner, most / truth->scale));
 }
 
-int truth_is_met(const struct psr_truth *truth, const struct view *view, double x, double y, int n, int side)
+/* Traces row j of side * side rays, spread over the n * n pixels from (x, y) on. */
+static void trace_row(struct ray_hit *hit, const struct psr_truth *truth, const struct view *view, const double at[2],
+                      int n, int side, int j)
 {
 	struct ray ray[MOST_SIDE];
+	for (int i = 0; i < side; i++)
+		truth_ray(truth, view, at[0] + (i + 0.5) / side * n, at[1] + (j + 0.5) / side * n, &ray[i]);
+	truth_trace(truth, ray, side, view->near_z, hit);
+}
+
+int truth_is_met(const struct psr_truth *truth, const struct view *view, double x, double y, int n, int side)
+{
 	struct ray_hit hit[MOST_SIDE];
 	for (int j = 0; j < side; j++) {
-		for (int i = 0; i < side; i++)
-			truth_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
-		truth_trace(truth, ray, side, view->near_z, hit);
+		trace_row(hit, truth, view, (const double[2]){ x, y }, n, side, j);
 		for (int i = 0; i < side; i++)
 			if (hit[i].prim != RAY_NONE)
 				return 1;
@@ -108,12 +115,9 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 
 int truth_reaches(const struct psr_truth *truth, const struct view *view, double x, double y, int n, double z)
 {
-	struct ray ray[REACH_SIDE];
 	struct ray_hit hit[REACH_SIDE];
 	for (int j = 0; j < REACH_SIDE; j++) {
-		for (int i = 0; i < REACH_SIDE; i++)
-			truth_ray(truth, view, x + (i + 0.5) / REACH_SIDE * n, y + (j + 0.5) / REACH_SIDE * n, &ray[i]);
-		truth_trace(truth, ray, REACH_SIDE, view->near_z, hit);
+		trace_row(hit, truth, view, (const double[2]){ x, y }, n, REACH_SIDE, j);
 		for (int i = 0; i < REACH_SIDE; i++)
 			if (hit[i].prim == RAY_NONE ? isinf(z) : hit[i].t * truth->scale >= z)
 				return 1;

@@ -48,8 +48,8 @@ static int read_steps(struct unpacking *u, struct psr_error *err)
 	u->streams = b[3];
 	u->n_chunks = (uint32_t)get(b + 4, 4);
 	n = get(b + 8, 8);
-	if (u->levels < OCTREE_LEAST_LEVELS || u->levels > OCTREE_MOST_LEVELS || (b[1] != CHUNKS_WAY_FAST && b[1] != CHUNKS_WAY_SMALL) ||
-	    u->cut >= u->levels || u->streams >> OCTREE_STREAMS != 0 || n == 0 ||
+	if (u->levels < OCTREE_LEAST_LEVELS || u->levels > OCTREE_MOST_LEVELS ||
+	    (b[1] != CHUNKS_WAY_FAST && b[1] != CHUNKS_WAY_SMALL) || u->cut >= u->levels || u->streams >> OCTREE_STREAMS != 0 || n == 0 ||
 	    n > (chunk_may_step(u->streams) ? OCTREE_MOST_STEPS : 1))
 		return psr_fail(err, PSR_ERR_FORMAT, "a packed octree of %d levels, cut at %d, packed by way %d, of streams %#x, "
 		                "in %llu steps, is not known", u->levels, u->cut, b[1], u->streams, (unsigned long long)n);

@@ -136,8 +136,7 @@ static void sample_mesh(struct parts *p)
 	const struct dpoint_mesh_options mesh = {
 		.origin = { b->info->origin[0], b->info->origin[1], b->info->origin[2] }, .scale = 1 / b->info->scale,
 		.cell = b->options->piece, .turn = TURN * (double)p->cover.sine, .delta = p->cover.delta, .grain_of = b->grain,
-		.cover = &p->cover,
-		.looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
+		.cover = &p->cover, .looks = BUILDING_LOOKS, .look = look_at, .userdata = b,
 	};
 
 	p->rc = dpoint_sample_mesh(&b->surface, b->mesh, &mesh, &p->err);

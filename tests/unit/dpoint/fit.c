@@ -120,8 +120,8 @@ static void samples_whose_rectangles_are_small_come_by_cells(void **state)
 	}
 }
 
-/* Two steps of a stair, of 1/8 by 1/2, that go up by 0.1. Rectangles narrower than the overhang end before the riser, as
- * all do: but for the overhang, and a cell of 1/512 beside it. */
+/* A floor of 1/8 by 1/2, and a wall of 0.1 at its end. Rectangles that are narrower than the overhang along the wall end
+ * there, but for the overhang, as wide ones do. A place is a float below 1. */
 static void a_rectangle_narrower_than_the_overhang_ends_along_its_length(void **state)
 {
 	struct dpoint_surface surface;
