@@ -42,14 +42,19 @@ static double moved(enum surface surface, const double p[3], int a, double by_a,
 	return value(surface, q);
 }
 
+/* Returns the length of the first derivatives. */
+static double exact_normal(double normal[3], enum surface surface, const double p[3])
+{
+	for (int a = 0; a < 3; a++)
+		normal[a] = (moved(surface, p, a, STEP, a, 0) - moved(surface, p, a, -STEP, a, 0)) / (2 * STEP);
+	return v3d_normalize(normal, normal);
+}
+
 /* Unit normal, and the second form: minus the second derivatives over the first. */
 static void exact(double normal[3], double second[3][3], enum surface surface, const double p[3])
 {
-	double length;
+	const double length = exact_normal(normal, surface, p);
 
-	for (int a = 0; a < 3; a++)
-		normal[a] = (moved(surface, p, a, STEP, a, 0) - moved(surface, p, a, -STEP, a, 0)) / (2 * STEP);
-	length = v3d_normalize(normal, normal);
 	for (int a = 0; a < 3; a++)
 		for (int b = 0; b < 3; b++)
 			second[a][b] = -(moved(surface, p, a, STEP, b, STEP) - moved(surface, p, a, STEP, b, -STEP) -
@@ -75,36 +80,103 @@ struct sampled {
 	uint64_t *attr;
 	struct dpoint_cloud cloud;
 	struct cloud_fit *fit;
+	double edge; /* of cells, which begin at -1.1 and hold points by lists */
+	uint32_t side, *first, *next;
 };
+
+#define NONE UINT32_MAX
+
+static uint32_t along(const struct sampled *s, double x)
+{
+	const double cell = (x + 1.1) / s->edge;
+
+	assert_true(cell >= 0 && cell < s->side);
+	return (uint32_t)cell;
+}
+
+static uint32_t *cell_of(const struct sampled *s, const uint32_t at[3])
+{
+	return &s->first[((size_t)at[2] * s->side + at[1]) * s->side + at[0]];
+}
+
+static void begin_cells(struct sampled *s, double edge, uint32_t most)
+{
+	s->edge = edge;
+	s->side = (uint32_t)(2.2 / edge) + 1;
+	s->first = malloc((size_t)s->side * s->side * s->side * sizeof *s->first);
+	s->next = malloc(most * sizeof *s->next);
+	memset(s->first, 0xff, (size_t)s->side * s->side * s->side * sizeof *s->first);
+}
+
+static void put_in_cell(struct sampled *s, uint32_t i)
+{
+	const uint32_t at[3] = { along(s, s->at[i][0]), along(s, s->at[i][1]), along(s, s->at[i][2]) };
+	uint32_t *first = cell_of(s, at);
+
+	s->next[i] = *first;
+	*first = i;
+}
+
+static void end_cells(struct sampled *s)
+{
+	free(s->first);
+	free(s->next);
+}
+
+/* Lists the points of all cells that are up to `reach` cells from that of p, in each of three ways. */
+static uint32_t list_near(uint32_t *list, const struct sampled *s, const double p[3], int reach)
+{
+	uint32_t low[3], high[3], at[3], n = 0;
+
+	for (int k = 0; k < 3; k++) {
+		const int cell = (int)along(s, p[k]);
+
+		low[k] = (uint32_t)(cell > reach ? cell - reach : 0);
+		high[k] = (uint32_t)(cell + reach < (int)s->side ? cell + reach : (int)s->side - 1);
+	}
+	for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
+		for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+			for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
+				for (uint32_t i = *cell_of(s, at); i != NONE; i = s->next[i])
+					list[n++] = i;
+	return n;
+}
 
 /* Random places of the surface no nearer to each other than h / 2, about as many as fit. */
 static void sample(struct sampled *s, enum surface surface, double h, double noise)
 {
 	const uint32_t most = (uint32_t)(14 / (h * h));
+	uint32_t *near = malloc(most * sizeof *near);
 	uint64_t seed = 5;
 
 	s->n = 0;
 	s->at = malloc(most * sizeof *s->at);
+	begin_cells(s, h, most);
 	for (int tries = 0; tries < 150000 && s->n < most; tries++) {
-		double p[3], normal[3], second[3][3], nearest = INFINITY;
+		double p[3], normal[3];
+		int is_free = 1;
 
 		for (int k = 0; k < 3; k++)
 			p[k] = random_in(&seed, -1, 1);
 		for (int turn = 0; turn < 4; turn++) {
-			exact(normal, second, surface, p);
+			exact_normal(normal, surface, p);
 			v3d_add_scaled(p, p, -value(surface, p), normal);
 		}
 		if (fabs(value(surface, p)) > 1e-9 || fabs(p[0]) > 1 || fabs(p[1]) > 1 || fabs(p[2]) > 1)
 			continue;
-		for (uint32_t i = 0; i < s->n && nearest > h * h / 4; i++) {
+		for (uint32_t n = list_near(near, s, p, 1); n > 0 && is_free; n--) {
 			double away[3];
 
-			v3d_sub(away, s->at[i], p);
-			nearest = fmin(nearest, v3d_dot(away, away));
+			v3d_sub(away, s->at[near[n - 1]], p);
+			is_free = v3d_dot(away, away) > h * h / 4;
 		}
-		if (nearest > h * h / 4)
-			memcpy(s->at[s->n++], p, sizeof p);
+		if (is_free) {
+			memcpy(s->at[s->n], p, sizeof p);
+			put_in_cell(s, s->n++);
+		}
 	}
+	end_cells(s);
+	free(near);
 	s->normal = malloc(s->n * sizeof *s->normal);
 	s->radius = malloc(s->n * sizeof *s->radius);
 	s->part = calloc(s->n, sizeof *s->part);
@@ -112,9 +184,9 @@ static void sample(struct sampled *s, enum surface surface, double h, double noi
 	s->near = malloc((size_t)s->n * DPOINT_MOST_NEAR * sizeof *s->near);
 	s->fit = malloc(s->n * sizeof *s->fit);
 	for (uint32_t i = 0; i < s->n; i++) {
-		double normal[3], second[3][3], off[3] = { 0.17, 0, 0 };
+		double normal[3], off[3] = { 0.17, 0, 0 };
 
-		exact(normal, second, surface, s->at[i]);
+		exact_normal(normal, surface, s->at[i]);
 		v3d_add_scaled(s->at[i], s->at[i], noise * (random_in(&seed, -1, 1) + random_in(&seed, -1, 1)), normal);
 		/* Off by some 10 degrees to begin with. */
 		v3d_add(normal, normal, off);
@@ -124,29 +196,45 @@ static void sample(struct sampled *s, enum surface surface, double h, double noi
 	}
 }
 
-static void find_near(struct sampled *s)
+/* The nearest of each, the first of those that are as near. */
+static void find_near(struct sampled *s, double h)
 {
+	uint32_t *list = malloc(s->n * sizeof *list);
+
+	begin_cells(s, h, s->n);
+	for (uint32_t i = 0; i < s->n; i++)
+		put_in_cell(s, i);
 	for (uint32_t i = 0; i < s->n; i++) {
-		double distance[DPOINT_MOST_NEAR + 1];
-		uint32_t *near = &s->near[i * DPOINT_MOST_NEAR], n = 0;
+		double distance[DPOINT_MOST_NEAR];
+		uint32_t *near = &s->near[i * DPOINT_MOST_NEAR], n;
 
-		for (uint32_t j = 0; j < s->n; j++) {
-			double away[3], d;
-			uint32_t to = n;
+		/* What is in no cell that is looked at is as far as these reach, and further. */
+		for (int reach = 3; n = 0, reach <= (int)s->side; reach++) {
+			for (uint32_t left = list_near(list, s, s->at[i], reach); left > 0; left--) {
+				const uint32_t j = list[left - 1];
+				double away[3], d;
+				uint32_t to;
 
-			v3d_sub(away, s->at[j], s->at[i]);
-			d = v3d_dot(away, away);
-			if (j == i || (n == DPOINT_MOST_NEAR && d >= distance[n - 1]))
-				continue;
-			to = n < DPOINT_MOST_NEAR ? n++ : n - 1;
-			for (; to > 0 && distance[to - 1] > d; to--) {
-				distance[to] = distance[to - 1];
-				near[to] = near[to - 1];
+				v3d_sub(away, s->at[j], s->at[i]);
+				d = v3d_dot(away, away);
+				to = n;
+				while (to > 0 && (distance[to - 1] > d || (distance[to - 1] == d && near[to - 1] > j)))
+					to--;
+				if (j == i || to == DPOINT_MOST_NEAR)
+					continue;
+				n += n < DPOINT_MOST_NEAR;
+				memmove(&distance[to + 1], &distance[to], (n - 1 - to) * sizeof *distance);
+				memmove(&near[to + 1], &near[to], (n - 1 - to) * sizeof *near);
+				distance[to] = d;
+				near[to] = j;
 			}
-			distance[to] = d;
-			near[to] = j;
+			if (n == DPOINT_MOST_NEAR && distance[n - 1] < reach * s->edge * (reach * s->edge))
+				break;
 		}
+		assert_int_equal(n, DPOINT_MOST_NEAR);
 	}
+	end_cells(s);
+	free(list);
 	s->cloud = (struct dpoint_cloud){ s->n, DPOINT_MOST_NEAR, (const double (*)[3])s->at, (const float (*)[3])s->normal,
 		                              s->radius, s->near, s->part, s->attr };
 }
@@ -154,7 +242,7 @@ static void find_near(struct sampled *s)
 static void make(struct sampled *s, enum surface surface, double h, double noise)
 {
 	sample(s, surface, h, noise);
-	find_near(s);
+	find_near(s, h);
 	assert_int_equal(cloud_fit_all(s->fit, &s->cloud, &cover, DELTA, NULL), PSR_OK);
 }
 

@@ -85,10 +85,17 @@ static int gets_through(const struct dpoint_surface *surface, const struct dpoin
 	for (size_t i = 0; i < surface->n_candidates; i++) {
 		const struct dpoint_candidate *c = &surface->candidate[i];
 		const double l[2] = { c->point.lambda_u, c->point.lambda_u * c->point.rho };
-		double axis[3][3], p[3], r[3], wide[2];
+		double axis[3][3], away[3], p[3], r[3], wide[2];
 		float extent[2];
 
 		if (!choice->is_kept[i])
+			continue;
+		for (int k = 0; k < 3; k++)
+			away[k] = at[k] - c->point.at[k];
+		dpoint_candidate_extent(extent, c, o->sine);
+		for (int k = 0; k < 2; k++)
+			wide[k] = extent[k];
+		if (v3d_length(away) > 2 * (wide[0] + wide[1]) + 0.1) /* quadrics lean less than that */
 			continue;
 		for (int k = 0; k < 3; k++) {
 			axis[0][k] = c->point.u[k];
@@ -98,15 +105,10 @@ static int gets_through(const struct dpoint_surface *surface, const struct dpoin
 		for (int k = 0; k < 3; k++) {
 			p[k] = r[k] = 0;
 			for (int j = 0; j < 3; j++) {
-				p[k] += axis[k][j] * (at[j] - c->point.at[j]);
+				p[k] += axis[k][j] * away[j];
 				r[k] += axis[k][j] * w[j];
 			}
 		}
-		dpoint_candidate_extent(extent, c, o->sine);
-		for (int k = 0; k < 2; k++)
-			wide[k] = extent[k];
-		if (v3d_length(p) > 2 * (wide[0] + wide[1]) + 0.1) /* quadrics lean less than that */
-			continue;
 		if (is_stopped(p, r, l, wide, 6.001 * o->height))
 			return 0;
 	}
