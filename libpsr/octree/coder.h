@@ -90,17 +90,16 @@ static inline __attribute__((always_inline)) unsigned coder_bit(struct coder *c,
 {
 	const uint32_t bound = (uint32_t)((uint64_t)c->range * p >> 16);
 
+	uint32_t none; /* all bits for a 0: a branch would often be foretold wrongly */
+
 	if (is_decoding)
 		bit = c->code < bound;
-	if (bit) {
-		c->range = bound;
-	} else {
-		if (is_decoding)
-			c->code -= bound;
-		else
-			c->low += bound;
-		c->range -= bound;
-	}
+	none = bit - 1u;
+	if (is_decoding)
+		c->code -= bound & none;
+	else
+		c->low += bound & none;
+	c->range = bound + ((c->range - 2 * bound) & none);
 	while (c->range < 1u << 24) {
 		c->range <<= 8;
 		if (is_decoding)

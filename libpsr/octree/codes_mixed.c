@@ -1,31 +1,38 @@
 #include <string.h>
 #include "codes.h"
+#ifdef __SSE2__ /* as every x86-64 has; the compiler finds no sums of products by itself */
+#include <emmintrin.h>
+#endif
 
 /* Each bit of a code by five contexts, each with a probability of its own, and where codes are hard to foretell by a
  * sum of what each neighbour adds. Their logits are weighed, and the weights learn, too. Integers alone. */
 #define CONTEXTS 5
-#define INPUTS (CONTEXTS + 2) /* their logits, a constant, and the sum */
 #define A_BITS 14
 #define B_BITS 16
 #define C_BITS 15
-#define D_BITS 18
+#define D_BITS 19
 #define E_BITS 16
 #define COUNTS 127     /* a probability's speed of learning goes down to 1 in this many */
 #define KEPT_COUNT 2   /* at most, from level to level: what was learnt counts for little on the next */
 #define WEIGHT_SETS (9 << 6)
-#define LEARN 10       /* of weights */
+#define LEARN 6        /* of weights, in 2^-21 */
 #define SUM_LEARN 5    /* of the parts of a sum, in halves */
-#define MOST_PART (1 << 28)
+#define MOST_PART (1 << 27) /* so that 14 of them add up in 32 bits */
 #define EASY (65536 * 3 / 20) /* bits of a level were wrong by so much in the mean: the next needs no sums */
+
+/* Four numbers or eight, which the compiler has a register for on any machine that has some. */
+typedef int32_t lanes __attribute__((vector_size(16)));
+typedef int16_t words __attribute__((vector_size(16)));
+#define AROUND 16 /* fours of what is around an octant */
 
 #define ALWAYS static inline __attribute__((always_inline))
 
 struct model {
 	/* Probabilities of 22 bits above counts of 10. */
 	uint32_t a[1 << A_BITS], b[1 << B_BITS], c[1 << C_BITS], d[1 << D_BITS], e[1 << E_BITS];
-	int32_t weight[WEIGHT_SETS][INPUTS];
+	words weight[WEIGHT_SETS]; /* in 2^-13: of the contexts' logits, a constant, the sum, nothing */
 	struct sum {
-		int32_t of_node[OCTREE_NEAR], of_child[43]; /* by bits of struct around; in 2^-24 */
+		lanes part[AROUND];    /* by bits of struct around; in 2^-24 */
 	} sum[4][8];               /* by row and octant */
 	uint64_t wrong;            /* what the bits of this level were wrong by, in 65536ths */
 	int16_t logit[4096];       /* ln(p / (1 - p)) * 256, p in 4096ths */
@@ -117,8 +124,7 @@ void *codes_mixed_model(void)
 	fill(model->d, 1 << D_BITS);
 	fill(model->e, 1 << E_BITS);
 	for (int s = 0; s < WEIGHT_SETS; s++)
-		for (int i = 0; i < INPUTS; i++)
-			model->weight[s][i] = i != CONTEXTS ? 17000 : 0;
+		model->weight[s] = (words){ 2125, 2125, 2125, 2125, 2125, 0, 2125, 0 };
 	memset(model->sum, 0, sizeof model->sum);
 	model->wrong = 0;
 	for (uint32_t n = 0; n <= COUNTS; n++)
@@ -143,58 +149,106 @@ ALWAYS int32_t held(int64_t x, int32_t most)
 	return (int32_t)(x < -most ? -most : x > most ? most : x);
 }
 
-/* What is around an octant. */
+#define FOUR(x) { -((x) & 1), -((x) >> 1 & 1), -((x) >> 2 & 1), -((x) >> 3) }
+static const lanes four[16] = { FOUR(0), FOUR(1), FOUR(2), FOUR(3), FOUR(4), FOUR(5), FOUR(6), FOUR(7),
+	                            FOUR(8), FOUR(9), FOUR(10), FOUR(11), FOUR(12), FOUR(13), FOUR(14), FOUR(15) };
+
+/* What is around an octant: which neighbours its node has, and itself, a constant; and known children, 3x3x3 of the
+ * neighbourhood's 4x4x4, itself in the middle. By fours: 28 bits and the nine rows of children. */
 struct around {
-	uint32_t there;  /* which neighbours its node has, and itself: a constant */
-	uint64_t window; /* known children: 3x3x3 of the neighbourhood's 4x4x4, itself in the middle */
+	uint32_t there;
+	uint64_t window;
 };
 
-static int32_t sum_parts(const struct sum *sum, const struct around *around)
+ALWAYS lanes four_of(const struct around *around, int i)
 {
-	int64_t x = 0;
+	const int row = i - 7, at = 4 * (row % 3) + 16 * (row / 3);
 
-	for (uint32_t left = around->there; left != 0; left &= left - 1)
-		x += sum->of_node[__builtin_ctz(left)];
-	for (uint64_t left = around->window; left != 0; left &= left - 1)
-		x += sum->of_child[__builtin_ctzll(left)];
-	return held(x >> 16, 2047);
+	return four[i < 7 ? around->there >> 4 * i & 15 : (unsigned)(around->window >> at) & 7];
 }
 
-static void learn_parts(struct sum *sum, const struct around *around, int32_t wrong)
+ALWAYS int32_t sum_parts(const struct sum *sum, const struct around *around)
+{
+	lanes x = { 0, 0, 0, 0 };
+
+#pragma GCC unroll 16
+	for (int i = 0; i < AROUND; i++)
+		x += sum->part[i] & four_of(around, i);
+	return held(((int64_t)x[0] + x[1] + x[2] + x[3]) >> 16, 2047);
+}
+
+static void hold_parts(struct sum *sum)
+{
+	for (int i = 0; i < AROUND; i++)
+		for (int k = 0; k < 4; k++)
+			sum->part[i][k] = held(sum->part[i][k], MOST_PART - 1);
+}
+
+ALWAYS void learn_parts(struct sum *sum, const struct around *around, int32_t wrong)
 {
 	const int32_t step = wrong * SUM_LEARN / 2;
+	const lanes steps = { step, step, step, step };
+	lanes over = { 0, 0, 0, 0 };
 
-	for (uint32_t left = around->there; left != 0; left &= left - 1)
-		sum->of_node[__builtin_ctz(left)] = held(sum->of_node[__builtin_ctz(left)] + step, MOST_PART);
-	for (uint64_t left = around->window; left != 0; left &= left - 1)
-		sum->of_child[__builtin_ctzll(left)] = held(sum->of_child[__builtin_ctzll(left)] + step, MOST_PART);
+#pragma GCC unroll 16
+	for (int i = 0; i < AROUND; i++) {
+		const lanes next = sum->part[i] + (steps & four_of(around, i));
+
+		over |= (next + MOST_PART) & -(2 * MOST_PART);
+		sum->part[i] = next;
+	}
+	if ((over[0] | over[1] | over[2] | over[3]) != 0)
+		hold_parts(sum);
+}
+
+/* Logits are below 2^11, and so their sum of products below 2^30. */
+ALWAYS int32_t weigh(words logit, words weight)
+{
+#ifdef __SSE2__
+	const lanes x = (lanes)_mm_madd_epi16((__m128i)logit, (__m128i)weight);
+
+	return (x[0] + x[1]) + (x[2] + x[3]);
+#else
+	int32_t x = 0;
+
+	for (int i = 0; i < 8; i++)
+		x += logit[i] * weight[i];
+	return x;
+#endif
+}
+
+/* By LEARN * wrong / 2^21 of each logit, and within -4..4. */
+ALWAYS void learn_weights(words *weight, words logit, int32_t wrong)
+{
+	const int16_t step = (int16_t)((wrong * LEARN + 128) >> 8);
+#ifdef __SSE2__
+	const __m128i x = _mm_mulhi_epi16(_mm_slli_epi16((__m128i)logit, 4), _mm_set1_epi16(step));
+
+	*weight = (words)_mm_adds_epi16((__m128i)*weight, _mm_srai_epi16(_mm_add_epi16(x, _mm_set1_epi16(1)), 1));
+#else
+	for (int i = 0; i < 8; i++) {
+		const int32_t x = (*weight)[i] + (((logit[i] * 16 * step >> 16) + 1) >> 1);
+
+		(*weight)[i] = (int16_t)(x < INT16_MIN ? INT16_MIN : x > INT16_MAX ? INT16_MAX : x);
+	}
+#endif
 }
 
 ALWAYS unsigned mix_bit(struct model *model, struct coder *coder, int is_decoding, uint32_t *const p[CONTEXTS],
                         struct sum *sum, const struct around *around, unsigned set, unsigned bit)
 {
-	const int n_inputs = sum != NULL ? INPUTS : INPUTS - 1;
-	int32_t *weight = model->weight[set], logit[INPUTS], wrong;
-	int64_t mean = 0;
-	uint32_t share;
+	const int32_t of_sum = sum != NULL ? sum_parts(sum, around) : 0;
+	const words logit = { model->logit[*p[0] >> 20], model->logit[*p[1] >> 20], model->logit[*p[2] >> 20],
+		                  model->logit[*p[3] >> 20], model->logit[*p[4] >> 20], 256, (int16_t)of_sum, 0 };
+	const uint32_t share = model->share[2048 + held(weigh(logit, model->weight[set]) >> 13, 2047)];
+	int32_t wrong;
 
-#pragma GCC unroll 8
-	for (int i = 0; i < CONTEXTS; i++)
-		logit[i] = model->logit[*p[i] >> 20];
-	logit[CONTEXTS] = 256;
-	logit[CONTEXTS + 1] = sum != NULL ? sum_parts(sum, around) : 0;
-#pragma GCC unroll 8
-	for (int i = 0; i < n_inputs; i++)
-		mean += (int64_t)logit[i] * weight[i];
-	share = model->share[2048 + held(mean >> 16, 2047)];
 	bit = coder_bit(coder, is_decoding, share, bit);
 	wrong = (int32_t)(bit << 16) - (int32_t)share;
 	model->wrong += (uint64_t)(wrong < 0 ? -wrong : wrong);
 	if (sum != NULL)
-		learn_parts(sum, around, (int32_t)(bit << 16) - (int32_t)model->share[2048 + logit[CONTEXTS + 1]]);
-#pragma GCC unroll 8
-	for (int i = 0; i < n_inputs; i++)
-		weight[i] = held(weight[i] + (((int64_t)logit[i] * wrong * LEARN + (1 << 17)) >> 18), 1 << 20);
+		learn_parts(sum, around, (int32_t)(bit << 16) - (int32_t)model->share[2048 + of_sum]);
+	learn_weights(&model->weight[set], logit, wrong);
 #pragma GCC unroll 8
 	for (int i = 0; i < CONTEXTS; i++)
 		learn(model, p[i], bit);
@@ -215,6 +269,24 @@ ALWAYS unsigned known_of(uint32_t p)
 /* All children around an octant, itself in the middle: 3x3x3 of the neighbourhood's 4x4x4. */
 #define WINDOW 0x77707770777u
 
+/* Finds where the probabilities of four octants stand in b and d, by all that is known before the first one's bit, and
+ * fetches them: there are 8 beside each other, by the bits of those of the four that come before. */
+ALWAYS void find_slots(uint32_t *b[8], uint32_t *d[8], struct model *model, uint64_t known, uint32_t there, int row,
+                       unsigned first)
+{
+#pragma GCC unroll 4
+	for (unsigned j = first; j < first + 4; j++) {
+		const uint64_t window = known >> ((j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2)) & WINDOW;
+		const uint64_t key = window << 3 | j;
+
+		b[j] = &model->b[scatter(key, B_BITS - (j & 3)) << (j & 3)];
+		d[j] = &model->d[scatter(key * 0x100000001b3u ^ (uint64_t)touched_by(j, there) << 57 ^ (uint64_t)row << 55,
+		                         D_BITS - (j & 3)) << (j & 3)];
+		__builtin_prefetch(b[j], 1);
+		__builtin_prefetch(d[j], 1);
+	}
+}
+
 ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_near *near, int is_decoding,
                       int has_sums)
 {
@@ -222,8 +294,9 @@ ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_
 	const struct octree_level *level = &job->levels->at[job->level];
 	const unsigned code = is_decoding ? 0 : level->code[node];
 	const int up = job->levels->height - 1 - job->level, row = up < 3 ? up : 3;
-	uint32_t there = 0, faces;
+	uint32_t there = 0, faces, *b[8], *d[8], *e;
 	uint64_t known = 0; /* children of neighbours that come earlier, and own ones so far */
+	struct coder coder = *job->coder; /* in registers */
 	unsigned so_far = 0;
 	struct around around = { 0, 0 };
 
@@ -238,6 +311,9 @@ ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_
 	faces = (there >> 4 & 1) | (there >> 10 & 1) << 1 | (there >> 12 & 1) << 2 | (there >> 14 & 1) << 3 |
 	        (there >> 16 & 1) << 4 | (there >> 22 & 1) << 5;
 	around.there = there;
+	e = &model->e[scatter((uint64_t)there * 0x100000001b3u, E_BITS - 3) << 3];
+	__builtin_prefetch(e, 1);
+	find_slots(b, d, model, known, there, row, 0);
 #pragma GCC unroll 8
 	for (unsigned j = 0; j < 8; j++) {
 		const unsigned corner = (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2), begun = 1u << j | so_far;
@@ -246,25 +322,27 @@ ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_
 		uint32_t *p[CONTEXTS];
 		unsigned bit, set;
 
+		if (j == 4)
+			find_slots(b, d, model, known, there, row, 4);
 		around.window = window;
 		if (j == 7 && so_far == 0) { /* no code is 0 */
 			so_far = 128;
 			break;
 		}
-		p[0] = &model->a[begun << 6 | faces];
-		p[1] = &model->b[scatter(window << 3 | j, B_BITS)];
-		p[2] = &model->c[begun << 7 | touched];
-		p[3] = &model->d[scatter((window << 3 | j) * 0x100000001b3u ^ (uint64_t)touched << 57 ^ (uint64_t)row << 55,
-		                         D_BITS)];
-		p[4] = &model->e[scatter(((uint64_t)there << 3 | j) * 0x100000001b3u, E_BITS)];
+		p[0] = &model->a[faces << 8 | begun];
+		p[1] = b[j] + (j < 4 ? so_far : so_far >> 4);
+		p[2] = &model->c[touched << 8 | begun];
+		p[3] = d[j] + (j < 4 ? so_far : so_far >> 4);
+		p[4] = &e[j];
 		set = (3 * known_of(*p[3]) + known_of(*p[4])) << 6 | (unsigned)row << 4 | j << 1 | (so_far != 0);
-		bit = mix_bit(model, job->coder, is_decoding, p, has_sums ? &model->sum[row][j] : NULL, &around, set,
+		bit = mix_bit(model, &coder, is_decoding, p, has_sums ? &model->sum[row][j] : NULL, &around, set,
 		              code >> j & 1);
 		so_far |= bit << j;
 		known |= (uint64_t)bit << (corner + 21);
 	}
+	*job->coder = coder;
 	if (is_decoding)
-		codes_keep(job, job->coder, (uint8_t)so_far);
+		codes_keep(job, &coder, (uint8_t)so_far);
 }
 
 static void pack_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)

@@ -53,26 +53,35 @@ struct walk {
 	int level;
 	void (*visit)(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata);
 	void *userdata;
-	/* Of the neighbours of an octant: which of the parent's neighbours holds each, as which octant. */
-	uint8_t from[8][OCTREE_NEAR], octant[8][OCTREE_NEAR];
 };
 
-static void find_families(struct walk *walk)
-{
-	for (int j = 0; j < 8; j++)
-		for (int k = 0; k < OCTREE_NEAR; k++) {
-			const int place[3] = { (j & 1) + k % 3 + 1, (j >> 1 & 1) + k / 3 % 3 + 1, (j >> 2) + k / 9 + 1 };
+/* What children there are of a node and its neighbours. */
+struct family {
+	uint32_t first[OCTREE_NEAR];
+	uint8_t code[OCTREE_NEAR];
+};
 
-			walk->from[j][k] = (uint8_t)(place[0] / 2 + 3 * (place[1] / 2) + 9 * (place[2] / 2));
-			walk->octant[j][k] = (uint8_t)((place[0] & 1) | (place[1] & 1) << 1 | (place[2] & 1) << 2);
-		}
+/* Finds the neighbours of octant j. It is constant, so that the compiler knows which of the parent's neighbours holds
+ * each, and as which octant. */
+static inline __attribute__((always_inline)) void find_near(struct octree_near *near, const struct family *family,
+                                                            unsigned j)
+{
+#pragma GCC unroll 27
+	for (unsigned k = 0; k < OCTREE_NEAR; k++) {
+		const unsigned x = (j & 1) + k % 3 + 1, y = (j >> 1 & 1) + k / 3 % 3 + 1, z = (j >> 2) + k / 9 + 1;
+		const unsigned from = x / 2 + 3 * (y / 2) + 9 * (z / 2), octant = (x & 1) | (y & 1) << 1 | (z & 1) << 2;
+		const unsigned code = family->code[from];
+		const uint32_t none = (code >> octant & 1) - 1u; /* all bits, or none */
+
+		near->at[k] = (family->first[from] + octree_rank[octant][code]) | none;
+	}
 }
 
 static void descend(const struct walk *walk, int depth, uint32_t node, uint64_t path, const struct octree_near *near)
 {
 	const struct octree_level *level = &walk->levels->at[depth];
-	uint32_t child, first[OCTREE_NEAR];
-	uint8_t code[OCTREE_NEAR];
+	struct family family;
+	uint32_t child;
 
 	if (depth == walk->level) {
 		walk->visit(node, path, near, walk->userdata);
@@ -81,20 +90,17 @@ static void descend(const struct walk *walk, int depth, uint32_t node, uint64_t 
 	for (int k = 0; k < OCTREE_NEAR; k++) {
 		const uint32_t at = near->at[k];
 
-		code[k] = at != OCTREE_NONE ? level->code[at] : 0;
-		first[k] = at != OCTREE_NONE ? level->first[at] : 0;
+		family.code[k] = at != OCTREE_NONE ? level->code[at] : 0;
+		family.first[k] = at != OCTREE_NONE ? level->first[at] : 0;
 	}
-	child = first[OCTREE_SELF];
+	child = family.first[OCTREE_SELF];
+#pragma GCC unroll 8
 	for (unsigned j = 0; j < 8; j++) {
 		struct octree_near around;
 
-		if (!(code[OCTREE_SELF] >> j & 1))
+		if (!(family.code[OCTREE_SELF] >> j & 1))
 			continue;
-		for (int k = 0; k < OCTREE_NEAR; k++) {
-			const unsigned from = walk->from[j][k], octant = walk->octant[j][k];
-
-			around.at[k] = code[from] >> octant & 1 ? first[from] + octree_rank[octant][code[from]] : OCTREE_NONE;
-		}
+		find_near(&around, &family, j);
 		descend(walk, depth + 1, child++, path << 3 | j, &around);
 	}
 }
@@ -120,7 +126,6 @@ void octree_levels_walk(const struct octree_levels *levels, int level,
 {
 	struct walk walk = { .levels = levels, .level = level, .visit = visit, .userdata = userdata };
 
-	find_families(&walk);
 	for (uint32_t i = 0; i < levels->n_roots; i++) {
 		struct octree_near near;
 		uint32_t at[3];
