@@ -19,11 +19,11 @@
 #define MOVE 3
 #define MOST_MOVE PSR_SAMPLE_OFF
 
-/* A new block costs so much. A moved sample costs more in a projection that faces the place worse than three others:
- * many of these would show in colors and distances. At coarser levels moving comes before new blocks. */
-#define NEW_BLOCK 12
-#define NEW_COARSE_BLOCK 16
-#define WANTED 4.0f /* added in full for one place, shared by more */
+/* A new block costs so much, in samples: what places that want it share is nearly all of it, so that many open one, and
+ * few move (decision 0157). A moved sample costs more in a projection that faces the place worse than three others: many
+ * of these would show in colors and distances. */
+#define NEW_BLOCK 3
+#define WANTED 90.0f
 #define MOVE_ASIDE 4
 
 struct tries {
@@ -265,17 +265,12 @@ int candidates_are_superfluous(const struct candidates *candidates, const struct
 	return 0;
 }
 
-static float block_cost(const struct keeper *keeper)
-{
-	return keeper->sampling->level == 0 ? NEW_BLOCK : NEW_COARSE_BLOCK;
-}
-
 /* A patch without kept samples costs a block, shared by all places that want it. */
 static float opening_cost(const struct keeper *keeper, unsigned projection, struct sheet_ref ref)
 {
 	const struct patch *patch = patch_of(keeper, projection, ref);
 
-	return patch->kept != 0 ? 0 : block_cost(keeper) + WANTED / (float)(1 + patch->n_wanted);
+	return patch->kept != 0 ? 0 : NEW_BLOCK + WANTED / (float)(1 + patch->n_wanted);
 }
 
 /* Returns the triangle that lacks the fewest samples. */
@@ -331,7 +326,7 @@ static const struct candidate_move *best_move(const struct candidates *candidate
 
 		if (cost < *least
 		    && sheets_room(&keeper->sheets[move->projection], move->at, move->z, is_sheet).patch == SHEET_NONE)
-			cost += block_cost(keeper) + WANTED;
+			cost += NEW_BLOCK + WANTED;
 		if (cost < *least) {
 			*least = cost;
 			best = move;
