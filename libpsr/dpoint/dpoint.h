@@ -154,6 +154,31 @@ static inline void dpoint_extent(float extent[2], const struct dpoint *point, co
 	extent[1] = limit->delta[1] * v <= limit->sine ? limit->delta[1] : limit->sine / v;
 }
 
+/* Quadrics of neighbours end at slightly different heights, and a sight that grazes them would pass between. Where it
+ * leans by the tangent t to a point's normal, along u or v, it sees the rectangle reach further over those sides: by t
+ * times a sixteenth of a sample, which is as wide a strip across the sight, up to DPOINT_GRAZES of them (decision 0158).
+ * Where it goes along that side, too, it sees such a strip from its narrow end, which is why that is kept short. Seen
+ * from the front, the rectangle is as it is. */
+#define DPOINT_GRAZES 8
+
+/* A sixteenth of a sample of a model, inner units; of coarse ones, 2^-8. */
+static inline float dpoint_graze(uint32_t resolution)
+{
+	const float sixteenth = 0.125f / (float)resolution;
+
+	return sixteenth < 0x1p-8f ? sixteenth : 0x1p-8f;
+}
+
+/* How far a sight reaches over a side. along, across, down: its direction towards the side, along it, and along the
+ * normal. */
+static inline float dpoint_graze_by(float graze, float along, float across, float down)
+{
+	const float a = __builtin_fabsf(along), steep = a / (__builtin_fabsf(down) + 1e-20f);
+	const float slim = 1.5f * (1 + a / (__builtin_fabsf(across) + 1e-20f)), most = slim < DPOINT_GRAZES ? slim : DPOINT_GRAZES;
+
+	return graze * psr_choose(steep < most, steep, most);
+}
+
 /* asin(w) / w for |w| <= 1/2 by its series in q = w^2: all coefficients are positive and fall, so that what follows the
  * term of q^8 is at most c9 q^9 / (1 - q) = 0.0097617 * 4^-9 / 0.75 < 4.97e-8. */
 static inline float dpoint_asin_series(float q)

@@ -21,6 +21,7 @@ static const float slant[2] = { 0.65f, SEAL_LEAST_COSINE }; /* cosines of rays t
 /* A kept rectangle, less the slack, as rays meet it. */
 struct lid {
 	struct rectangle rectangle;
+	float graze;
 	int is_two_sided;
 };
 
@@ -47,6 +48,7 @@ static void lid_make(struct lid *lid, struct dpoint_cell *cell, const struct dpo
 
 	rectangle_of(r, c, options);
 	lid->is_two_sided = is_two_sided(options, c->part);
+	lid->graze = options->graze;
 	for (int k = 0; k < 2; k++)
 		r->extent[k] = fmaxf(0, r->extent[k] - options->slack);
 	memset(cell, 0, sizeof *cell);
@@ -116,8 +118,9 @@ static int stops_all(const struct rectangle *r, const float p[3], const float no
 
 /* Whether a ray from p in direction w, in the frame of the rectangle, meets its quadric within its sides, from `side`.
  * It is met where A t^2 + B t + C is 0; of its roots each has its side. */
-static int meets(const struct rectangle *r, const float p[3], const float w[3], float side, float behind)
+static int meets(const struct lid *lid, const float p[3], const float w[3], float side, float behind)
 {
+	const struct rectangle *r = &lid->rectangle;
 	const float l[2] = { r->lambda_u, r->lambda_u * r->rho };
 	const float a = 0.5f * (l[0] * w[0] * w[0] + l[1] * w[1] * w[1]);
 	const float b = l[0] * p[0] * w[0] + l[1] * p[1] * w[1] - w[2];
@@ -128,7 +131,8 @@ static int meets(const struct rectangle *r, const float p[3], const float w[3], 
 		return 0;
 	root = side * sqrtf(inside);
 	t = side * b <= 0 ? 2 * c / (root - b) : (-b - root) / (2 * a);
-	return t >= -behind && fabsf(p[0] + t * w[0]) <= r->extent[0] && fabsf(p[1] + t * w[1]) <= r->extent[1];
+	return t >= -behind && fabsf(p[0] + t * w[0]) <= r->extent[0] + dpoint_graze_by(lid->graze, w[0], w[1], w[2])
+	       && fabsf(p[1] + t * w[1]) <= r->extent[1] + dpoint_graze_by(lid->graze, w[1], w[0], w[2]);
 }
 
 /* Whether the lid is in the way of the ray that comes from `from` to the place. */
@@ -137,7 +141,7 @@ static int stops(const struct lid *lid, const float p[3], const float from[3], f
 	float w[3];
 
 	m3f_apply(w, (const float (*)[3])lid->rectangle.axis, from);
-	return meets(&lid->rectangle, p, w, 1, behind) || (lid->is_two_sided && meets(&lid->rectangle, p, w, -1, behind));
+	return meets(lid, p, w, 1, behind) || (lid->is_two_sided && meets(lid, p, w, -1, behind));
 }
 
 /* Stops those of the open rays that the lid is in the way of. Returns how many are left. */

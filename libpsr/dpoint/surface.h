@@ -84,6 +84,7 @@ struct dpoint_cover_options {
 	/* Rectangles cover less than they are by this part of an extent where nothing ended it: by epsilon, or at `delta`. So
 	 * neighbours overlap, and what words tilt them by is no gap from aslant. */
 	float margin, delta;
+	float graze;       /* that slanted rays may count on (seal.h): half of what is drawn; 0: none */
 	const uint8_t *is_two_sided; /* by part: rectangles that are seen from both sides; NULL: none is */
 };
 

@@ -51,7 +51,8 @@ int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, in
 	else
 		code = file_parse(bytes, n_bytes, pool, name, &model->content, err);
 	if (code == PSR_OK && model->content.has_points)
-		code = psr_points_create(&model->points, &model->content.points, name, err);
+		code = psr_points_create(&model->points, &model->content.points, model->content.info.resolution, name,
+		                         err);
 	psr_pool_destroy(pool);
 	if (code != PSR_OK) {
 		free(model);

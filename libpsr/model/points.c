@@ -138,7 +138,7 @@ static int put_sphere(struct making *m, uint32_t i)
 		m->center[k][i] = (int16_t)floorf(sphere.middle[k] * 16384 + 0.5f);
 		away[k] = sphere.middle[k] - (float)m->center[k][i] * (1.0f / 16384);
 	}
-	radius = sphere.radius + v3f_length(away) + SPHERE_SLACK;
+	radius = sphere.radius + v3f_length(away) + SPHERE_SLACK + DPOINT_GRAZES * m->points->graze;
 	if (!(radius <= MOST_SPHERE))
 		return 0;
 	m->radius[i] = (uint16_t)ceilf(radius * 32768);
@@ -208,7 +208,8 @@ static void point_to(struct psr_blocks *groups, const struct making *m, int has_
 	groups->cone_sine = m->sine;
 }
 
-int psr_points_create(struct psr_points **out, const struct dpoint_set *set, const char *name, struct psr_error *err)
+int psr_points_create(struct psr_points **out, const struct dpoint_set *set, uint32_t resolution, const char *name,
+                      struct psr_error *err)
 {
 	struct psr_points *points = calloc(1, sizeof *points);
 	struct making m = { .points = points };
@@ -217,6 +218,7 @@ int psr_points_create(struct psr_points **out, const struct dpoint_set *set, con
 	if (points == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for its points", name);
 	points->set = set;
+	points->graze = dpoint_graze(resolution);
 	points->groups = (struct psr_blocks){ .n_blocks = set->n_groups, .n_levels = 1, .n_samples = set->n_points,
 		                                  .n_clusters = (set->n_groups + POINTS_CLUSTER - 1) / POINTS_CLUSTER };
 	if (!make_arrays(&m)) {

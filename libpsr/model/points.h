@@ -13,12 +13,14 @@ struct psr_points {
 	 * Has no projections, depths or attributes. */
 	struct psr_blocks groups;
 	const struct dpoint_set *set;
+	float graze; /* dpoint.h */
 	uint64_t n_bytes;
 };
 
-/* Makes what is drawn of a valid set, which must outlive it. FORMAT: a rectangle reaches beyond what spheres can tell, 2
- * on any axis; MEMORY. */
-int psr_points_create(struct psr_points **out, const struct dpoint_set *set, const char *name, struct psr_error *err);
+/* Makes what is drawn of a valid set, which must outlive it, for a resolution. FORMAT: a rectangle reaches beyond what
+ * spheres can tell, 2 on any axis; MEMORY. */
+int psr_points_create(struct psr_points **out, const struct dpoint_set *set, uint32_t resolution, const char *name,
+                      struct psr_error *err);
 void psr_points_destroy(struct psr_points *points); /* NULL is fine */
 
 /* Returns the attributes of a point of a group, with the normal in its middle. */

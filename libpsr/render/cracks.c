@@ -6,6 +6,7 @@
 struct crack {
 	uint32_t at[CRACK_MOST][2];
 	int n;
+	float own, limit; /* depths: what is around is nearer than `own` by the threshold, and no further than `limit` */
 	uint64_t nearest; /* of the words around; UINT64_MAX: none */
 	float farthest;   /* of their depths */
 };
@@ -36,7 +37,7 @@ static int add(struct crack *c, uint32_t x, uint32_t y)
 }
 
 /* Looks at what is around a pixel of the crack. Returns 0 if the crack reaches the border, or is too long. */
-static int look_around(struct crack *c, const struct plan *plan, const struct psr_zstack *stack, float own, int k)
+static int look_around(struct crack *c, const struct plan *plan, const struct psr_zstack *stack, int k)
 {
 	const uint32_t x = c->at[k][0], y = c->at[k][1];
 
@@ -47,7 +48,7 @@ static int look_around(struct crack *c, const struct plan *plan, const struct ps
 			const uint64_t word = psr_zstack_row(stack, v)[u];
 			const float z = depth_of(word);
 
-			if (z * plan->gap_scale[1] + plan->gap_offset[1] < own) {
+			if (z <= c->limit && z * plan->gap_scale[1] + plan->gap_offset[1] < c->own) {
 				c->nearest = word < c->nearest ? word : c->nearest;
 				c->farthest = z > c->farthest ? z : c->farthest;
 			} else if (!add(c, u, v)) {
@@ -80,28 +81,56 @@ static int goes_on(const struct crack *c, const struct psr_zstack *stack, int k,
 	return 0;
 }
 
-int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
+static uint64_t nearest_beside(const struct psr_zstack *stack, uint32_t x, uint32_t y)
 {
-	const float own = depth_of(psr_zstack_row(stack, y)[x]);
-	struct crack c = { .at = { { x, y } }, .n = 1, .nearest = UINT64_MAX };
-	float spacing, apart, step;
-	uint32_t instance;
+	uint64_t nearest = UINT64_MAX;
 
+	for (uint32_t v = y - 1; v <= y + 1; v++)
+		for (uint32_t u = x - 1; u <= x + 1; u++) {
+			const uint64_t word = psr_zstack_row(stack, v)[u];
+
+			nearest = word < nearest ? word : nearest;
+		}
+	return nearest;
+}
+
+/* Whether a pixel is in a crack of at most `most` pixels, whose rims are within `apart` of its nearest neighbour, and
+ * across which a surface goes on within `step`. */
+static int is_in(const struct plan *plan, const struct psr_zstack *stack, const uint32_t at[2], int most, float apart,
+                 float step)
+{
+	struct crack c = { .at = { { at[0], at[1] } }, .n = 1, .nearest = UINT64_MAX };
+
+	c.own = depth_of(psr_zstack_row(stack, at[1])[at[0]]);
+	c.limit = depth_of(nearest_beside(stack, at[0], at[1])) + apart;
 	for (int k = 0; k < c.n; k++)
-		if (!look_around(&c, plan, stack, own, k))
+		if (!look_around(&c, plan, stack, k))
 			return 0;
-	if (c.nearest == UINT64_MAX)
-		return 0;
-	instance = plan_find_instance(plan, (uint32_t)c.nearest / PSR_BLOCK_SAMPLES);
-	if (plan->warp[instance].points == NULL)
-		return 0;
-	spacing = plan->instance[instance].level_spacing;
-	apart = (c.n > CRACK_SHORT ? CRACK_APART / 4 : c.n > 1 ? CRACK_APART / 2 : CRACK_APART) * spacing;
-	step = (c.n > 1 ? CRACK_STEP : CRACK_STEP_ALONE) * spacing;
-	if (c.farthest - depth_of(c.nearest) > apart)
+	if (c.n > most || c.nearest == UINT64_MAX || c.farthest - depth_of(c.nearest) > apart)
 		return 0;
 	for (int k = 0; k < c.n; k++)
 		if (!goes_on(&c, stack, k, step))
 			return 0;
 	return 1;
+}
+
+int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
+{
+	const uint32_t at[2] = { x, y };
+	uint32_t instance;
+	uint64_t near;
+	float spacing;
+
+	if (x == 0 || y == 0 || x + 1 == stack->width || y + 1 == stack->height)
+		return 0;
+	near = nearest_beside(stack, x, y);
+	if (near == PSR_WORD_EMPTY)
+		return 0;
+	instance = plan_find_instance(plan, (uint32_t)near / PSR_BLOCK_SAMPLES);
+	if (plan->warp[instance].points == NULL)
+		return 0;
+	spacing = plan->instance[instance].level_spacing;
+	return is_in(plan, stack, at, CRACK_MOST, CRACK_APART / 4 * spacing, CRACK_STEP * spacing)
+	       || is_in(plan, stack, at, CRACK_SHORT, CRACK_APART / 2 * spacing, CRACK_STEP * spacing)
+	       || is_in(plan, stack, at, 1, CRACK_APART * spacing, CRACK_STEP_ALONE * spacing);
 }

@@ -86,6 +86,7 @@ void plan_points(struct warp_points *out, double to_camera[3][3], double turn[3]
 	const double scale = v3d_length(to_camera[0]);
 
 	out->tables = dpoint_tables();
+	out->graze = out->model->graze;
 	out->direction = psr_direction_table();
 	for (int a = 0; a < 3; a++) {
 		out->origin[a] = (a < 2 ? focal : 1) * center[a];

@@ -57,6 +57,7 @@ struct warp_points {
 	 * `forward`; orthographic: which a pixel adds to where the line begins. */
 	float right[3], down[3], forward[3];
 	float center[2];             /* pixels: where the view axis meets the picture */
+	float graze;                 /* dpoint.h */
 };
 
 struct warp_instance {

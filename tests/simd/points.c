@@ -94,7 +94,8 @@ static void place_scene(struct check *c, struct scene *s, const struct warp_targ
 
 			m[i][k] = (i == k ? 1 : 0) + 2 * ((i == k ? q[i] * q[i] - size + q[3] * q[3] : q[i] * q[k] + across) / size);
 		}
-	s->to = (struct warp_points){ .model = &s->points, .tables = dpoint_tables(), .direction = psr_direction_table() };
+	s->to = (struct warp_points){ .model = &s->points, .tables = dpoint_tables(), .direction = psr_direction_table(),
+		                          .graze = check_one_in(c, 2) ? (float)check_real(c, 0, 0x1p-8) : 0 };
 	for (int a = 0; a < 3; a++) {
 		s->to.origin[a] = a < 2 ? 0 : distance;
 		for (int k = 0; k < 3; k++)

@@ -67,6 +67,7 @@ struct dpoint_cover_options building_cover(const struct dpoint_build_options *o)
 	struct dpoint_cover_options cover = {
 		.sine = dpoint_sine(o->epsilon), .slack = SLACK, .angle = (float)(o->degrees * PSR_DEGREE),
 		.height = (float)o->height, .overhang = OVERHANG, .looks = BUILDING_LOOKS, .delta = delta_of(o),
+		.graze = 0.5f * dpoint_graze(o->resolution),
 	};
 
 	if (o->error > 0) {

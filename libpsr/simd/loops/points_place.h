@@ -18,7 +18,7 @@ struct points_batch {
 	float origin[3][POINTS_ROOM], eye[3][POINTS_ROOM], delta[2][POINTS_ROOM];
 	uint32_t id[POINTS_ROOM], is_mixed[POINTS_ROOM];
 	/* Placed. */
-	float extent[2][POINTS_ROOM];
+	float extent[2][POINTS_ROOM]; /* with what sights that graze reach over */
 	float x[POINTS_ROOM], y[POINTS_ROOM], z[POINTS_ROOM], scale[POINTS_ROOM];
 	float from[3][POINTS_ROOM], sight[3][POINTS_ROOM], right[3][POINTS_ROOM], down[3][POINTS_ROOM];
 	float low[2][POINTS_ROOM], high[2][POINTS_ROOM]; /* pixels that the quadric is within */
@@ -92,7 +92,8 @@ static inline void make_rays(struct points_batch *b, const struct warp_target *t
 	const struct points_unpacked *p = &b->p;
 	const struct warp_points *points = b->in->points;
 	const int perspective = t->perspective;
-	const float near = t->near_z, fx = points->forward[0], fy = points->forward[1], fz = points->forward[2];
+	const float graze = points->graze, near = t->near_z;
+	const float fx = points->forward[0], fy = points->forward[1], fz = points->forward[2];
 	const float rx = points->right[0], ry = points->right[1], rz = points->right[2];
 	const float dx = points->down[0], dy = points->down[1], dz = points->down[2];
 	const float center_x = points->center[0], center_y = points->center[1];
@@ -112,20 +113,26 @@ static inline void make_rays(struct points_batch *b, const struct warp_target *t
 		const float to_x = psr_choose(perspective, b->eye[0][i] + px, fx);
 		const float to_y = psr_choose(perspective, b->eye[1][i] + py, fy);
 		const float to_z = psr_choose(perspective, b->eye[2][i] + pz, fz), depth = psr_choose(is_before, z, near);
-		const float s = p->lambda[0][i], r = p->lambda[1][i], eu = b->extent[0][i], ev = b->extent[1][i];
+		float eye_in[3], reach[3] = { 0, 0, 0 };
+
+		for (int k = 0; k < 3; k++)
+			eye_in[k] = points_dot(p->axis[k][0][i], p->axis[k][1][i], p->axis[k][2][i], to_x, to_y, to_z);
+		const float s = p->lambda[0][i], r = p->lambda[1][i];
+		const float eu = b->extent[0][i] + dpoint_graze_by(graze, eye_in[0], eye_in[1], eye_in[2]);
+		const float ev = b->extent[1][i] + dpoint_graze_by(graze, eye_in[1], eye_in[0], eye_in[2]);
 		const float rise_u = 0.5f * s * eu * eu, rise_v = 0.5f * r * ev * ev;
 		const float extent[3] = { eu, ev, __builtin_fabsf(rise_u) + __builtin_fabsf(rise_v) };
-		float eye_in[3], reach[3] = { 0, 0, 0 };
 
 		b->x[i] = psr_where(is_before, x * inverse) + center_x;
 		b->y[i] = psr_where(is_before, y * inverse) + center_y;
 		b->z[i] = depth;
+		b->extent[0][i] = eu;
+		b->extent[1][i] = ev;
 		b->scale[i] = psr_choose(perspective, depth, 1);
 		for (int k = 0; k < 3; k++) {
 			const float ax = p->axis[k][0][i], ay = p->axis[k][1][i], az = p->axis[k][2][i];
 			const float forward = points_dot(ax, ay, az, fx, fy, fz);
 
-			eye_in[k] = points_dot(ax, ay, az, to_x, to_y, to_z);
 			b->sight[k][i] = psr_choose(is_before, eye_in[k] * inverse, forward);
 			b->from[k][i] = psr_where(!is_before, near * forward - eye_in[k]);
 			b->right[k][i] = points_dot(ax, ay, az, rx, ry, rz);

@@ -191,6 +191,33 @@ static void any_word_unpacks_to_a_point(void **state)
 	}
 }
 
+/* Seen along u alone, a side reaches as far as makes a strip as wide as the sixteenth times the sight's sine, up to 82
+ * degrees. Whatever way a sight goes, w of length 1, what it sees of the reach is shorter than 3 sixteenths: with
+ * x = h min(|wu / wn|, 1.5 (1 + |wu / wv|)), x sqrt(wv^2 + wn^2) <= x |wv| + x |wn| <= 1.5 h (|wv| + |wu|) + h |wu|, and
+ * 1.5^2 + 2.5^2 < 3^2. */
+static void what_grazes_reaches_over_sides_by_little(void **state)
+{
+	const float h = dpoint_graze(256);
+	uint64_t seed = 4;
+
+	(void)state;
+	assert_true(dpoint_graze(256) == 0.125f / 256 && dpoint_graze(1) == 0x1p-8f);
+	assert_true(dpoint_graze_by(h, 0, 0, 1) == 0 && dpoint_graze_by(h, 0, 1, 0) == 0);
+	for (int i = 0; i < 20000; i++) {
+		double w[3];
+
+		random_unit(w, &seed);
+		const float x = dpoint_graze_by(h, (float)w[0], (float)w[1], (float)w[2]);
+		const float alone = dpoint_graze_by(h, (float)w[0], 0, (float)w[2]);
+
+		assert_true(x >= 0 && x <= DPOINT_GRAZES * h && x <= alone);
+		assert_true((double)x * sqrt(w[1] * w[1] + w[2] * w[2]) < 3 * (double)h);
+		if (fabs(w[0]) < 7.9 * fabs(w[2]))
+			assert_true(fabs((double)alone * fabs(w[2]) - (double)h * fabs(w[0])) <= (double)h * 0x1p-20);
+	}
+	assert_true(dpoint_graze_by(h, 1, 0, 0) == DPOINT_GRAZES * h);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -198,6 +225,7 @@ int main(void)
 		cmocka_unit_test(an_unpacked_point_is_within_the_promised_steps),
 		cmocka_unit_test(corners_of_the_box_are_reached),
 		cmocka_unit_test(any_word_unpacks_to_a_point),
+		cmocka_unit_test(what_grazes_reaches_over_sides_by_little),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -164,6 +164,18 @@ static void a_surface_goes_on_across_a_crack(void **state)
 	}
 }
 
+/* What shows through slopes by more than the threshold a pixel, and is no rim. */
+static void cracks_before_a_slope_close(void **state)
+{
+	(void)state;
+	for (uint32_t n = 2; n <= CRACK_MOST; n++) {
+		lay_surface();
+		for (uint32_t i = 0; i < n; i++)
+			set_depth(60 + i, 20, 2 * NEAR_Z + 10 * (float)i);
+		assert_int_equal(count_closed(1), n);
+	}
+}
+
 static void blocks_have_no_cracks(void **state)
 {
 	(void)state;
@@ -180,6 +192,7 @@ int main(void)
 		cmocka_unit_test(what_is_long_or_wide_stays_open),
 		cmocka_unit_test(rims_are_near_to_each_other),
 		cmocka_unit_test(a_surface_goes_on_across_a_crack),
+		cmocka_unit_test(cracks_before_a_slope_close),
 		cmocka_unit_test(blocks_have_no_cracks),
 	};
 
