@@ -174,7 +174,8 @@ static inline float dpoint_graze(uint32_t resolution)
 static inline float dpoint_graze_by(float graze, float along, float across, float down)
 {
 	const float a = __builtin_fabsf(along), steep = a / (__builtin_fabsf(down) + 1e-20f);
-	const float slim = 1.5f * (1 + a / (__builtin_fabsf(across) + 1e-20f)), most = slim < DPOINT_GRAZES ? slim : DPOINT_GRAZES;
+	const float slim = 1.5f * (1 + a / (__builtin_fabsf(across) + 1e-20f));
+	const float most = slim < DPOINT_GRAZES ? slim : DPOINT_GRAZES;
 
 	return graze * psr_choose(steep < most, steep, most);
 }
