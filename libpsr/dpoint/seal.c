@@ -7,7 +7,7 @@
 #include "base/array.h"
 #include "base/vec.h"
 #include "choice.h"
-#include "group.h"
+#include "lid.h"
 
 #define CHUNK 512 /* cells */
 #define AROUND 8  /* directions of a slant */
@@ -17,13 +17,6 @@
 
 static const float slant[2] = { 0.65f, SEAL_LEAST_COSINE }; /* cosines of rays to the cell's normal */
 #define DIRECTIONS (1 + 2 * AROUND)
-
-/* A kept rectangle, less the slack, as rays meet it. */
-struct lid {
-	struct rectangle rectangle;
-	float graze;
-	int is_two_sided;
-};
 
 struct sealing {
 	const struct dpoint_surface *surface;
@@ -35,28 +28,6 @@ struct sealing {
 	float around[AROUND][2], behind;
 	int is_failed;
 };
-
-static int is_two_sided(const struct dpoint_cover_options *options, uint32_t part)
-{
-	return options->is_two_sided != NULL && options->is_two_sided[part];
-}
-
-static void lid_make(struct lid *lid, struct dpoint_cell *cell, const struct dpoint_candidate *c,
-                     const struct dpoint_cover_options *options)
-{
-	struct rectangle *r = &lid->rectangle;
-
-	rectangle_of(r, c, options);
-	lid->is_two_sided = is_two_sided(options, c->part);
-	lid->graze = options->graze;
-	for (int k = 0; k < 2; k++)
-		r->extent[k] = fmaxf(0, r->extent[k] - options->slack);
-	memset(cell, 0, sizeof *cell);
-	for (int i = 0; i < 4; i++) {
-		v3f_add_scaled(cell->corner[i], r->at, i == 0 || i == 3 ? r->extent[0] : -r->extent[0], r->axis[0]);
-		v3f_add_scaled(cell->corner[i], cell->corner[i], i < 2 ? r->extent[1] : -r->extent[1], r->axis[1]);
-	}
-}
 
 /* ---- a cell ---- */
 
@@ -93,63 +64,12 @@ static void gather(struct nearby *nearby, const struct sealing *s, size_t i, con
 	nearby->near[nearby->n++].lid = &s->lid[s->tree.order[node->begin]];
 }
 
-/* Whether the rectangle stops each ray to the place p, in its frame, whose cosine to `normal` is at least
- * SEAL_LEAST_COSINE: its quadric is so near to the place, leans so little and is so nearly flat there that all of them
- * meet it well within its sides. */
-static int stops_all(const struct rectangle *r, const float p[3], const float normal[3], float behind)
-{
-	const float off = fabsf(p[2] - dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1]));
-	float n[3], cosine, lean, least, reach;
-
-	if (!(fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]))
-		return 0;
-	v3f_set(n, -(r->lambda_u * p[0]), -(r->lambda_u * r->rho * p[1]), 1);
-	v3f_normalize(n, n);
-	m3f_apply_transposed(n, (const float (*)[3])r->axis, n);
-	cosine = fminf(1, v3f_dot(n, normal));
-	lean = sqrtf(1 - cosine * cosine);
-	least = cosine * SEAL_LEAST_COSINE - lean * sqrtf(1 - SEAL_LEAST_COSINE * SEAL_LEAST_COSINE);
-	if (!(least > 0))
-		return 0;
-	reach = 2 * off / least;
-	return fabsf(r->lambda_u) * reach <= 0.25f * least && reach <= behind && fabsf(p[0]) + reach <= r->extent[0] &&
-	       fabsf(p[1]) + reach <= r->extent[1];
-}
-
-/* Whether a ray from p in direction w, in the frame of the rectangle, meets its quadric within its sides, from `side`.
- * It is met where A t^2 + B t + C is 0; of its roots each has its side. */
-static int meets(const struct lid *lid, const float p[3], const float w[3], float side, float behind)
-{
-	const struct rectangle *r = &lid->rectangle;
-	const float l[2] = { r->lambda_u, r->lambda_u * r->rho };
-	const float a = 0.5f * (l[0] * w[0] * w[0] + l[1] * w[1] * w[1]);
-	const float b = l[0] * p[0] * w[0] + l[1] * p[1] * w[1] - w[2];
-	const float c = dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1]) - p[2], inside = b * b - 4 * a * c;
-	float root, t;
-
-	if (inside < 0)
-		return 0;
-	root = side * sqrtf(inside);
-	t = side * b <= 0 ? 2 * c / (root - b) : (-b - root) / (2 * a);
-	return t >= -behind && fabsf(p[0] + t * w[0]) <= r->extent[0] + dpoint_graze_by(lid->graze, w[0], w[1], w[2])
-	       && fabsf(p[1] + t * w[1]) <= r->extent[1] + dpoint_graze_by(lid->graze, w[1], w[0], w[2]);
-}
-
-/* Whether the lid is in the way of the ray that comes from `from` to the place. */
-static int stops(const struct lid *lid, const float p[3], const float from[3], float behind)
-{
-	float w[3];
-
-	m3f_apply(w, (const float (*)[3])lid->rectangle.axis, from);
-	return meets(lid, p, w, 1, behind) || (lid->is_two_sided && meets(lid, p, w, -1, behind));
-}
-
 /* Stops those of the open rays that the lid is in the way of. Returns how many are left. */
 static int stop_rays(uint8_t *is_stopped, int n_open, const struct lid *lid, const float p[3], const float (*from)[3],
                      float behind)
 {
 	for (int d = 0; d < DIRECTIONS; d++)
-		if (!is_stopped[d] && stops(lid, p, from[d], behind)) {
+		if (!is_stopped[d] && lid_stops(lid, p, from[d], behind)) {
 			is_stopped[d] = 1;
 			n_open--;
 		}
@@ -167,7 +87,7 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 		struct near_lid *near = &nearby->near[i];
 
 		rectangle_sees(near->place, &near->lid->rectangle, at);
-		if (stops_all(&near->lid->rectangle, near->place, normal, s->behind))
+		if (lid_stops_all(near->lid, near->place, normal, SEAL_LEAST_COSINE, s->behind))
 			return 1;
 	}
 	for (int is_over = 1; is_over >= 0; is_over--)
@@ -227,7 +147,7 @@ static void put_first(struct nearby *nearby, const float at[3])
 static int stops_rays(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
                       const float (*from)[DIRECTIONS][3], const float middle[3])
 {
-	for (int side = 0; side < 1 + is_two_sided(s->options, cell->part); side++)
+	for (int side = 0; side < 1 + dpoint_is_two_sided(s->options, cell->part); side++)
 		for (int p = 0; p < PLACES; p++) {
 			const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
 			float place[3];
@@ -295,7 +215,8 @@ static int make_lids(struct sealing *s, const struct dpoint_choice *choice, stru
 	}
 	for (size_t i = 0; i < s->surface->n_candidates; i++)
 		if (choice->is_kept[i]) {
-			lid_make(&s->lid[n], &cell[n], &s->surface->candidate[i], s->options);
+			lid_make(&s->lid[n], &s->surface->candidate[i], s->options);
+			lid_corners(&cell[n], &s->lid[n]);
 			n++;
 		}
 	rc = cell_tree_init(&s->tree, cell, n, pool);

@@ -88,6 +88,11 @@ struct dpoint_cover_options {
 	const uint8_t *is_two_sided; /* by part: rectangles that are seen from both sides; NULL: none is */
 };
 
+static inline int dpoint_is_two_sided(const struct dpoint_cover_options *options, uint32_t part)
+{
+	return options->is_two_sided != NULL && options->is_two_sided[part];
+}
+
 /* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along
  * its normal, where the rectangle is shortened by the cosine of its sine: the tangent planes of two points on a circle
  * meet at r tan a, above a place that is r sin a from both. So rectangles that cover neighbouring places cross, and

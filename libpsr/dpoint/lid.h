@@ -1,0 +1,27 @@
+/* A kept rectangle, less the slack, as rays meet it. */
+#ifndef PSR_DPOINT_LID_H
+#define PSR_DPOINT_LID_H
+
+#include "rectangle.h"
+
+struct lid {
+	struct rectangle rectangle;
+	float graze; /* that slanted rays may count on (dpoint_graze_by()) */
+	int is_two_sided;
+};
+
+void lid_make(struct lid *lid, const struct dpoint_candidate *candidate, const struct dpoint_cover_options *options);
+
+/* The corners of its plane, for a tree of lids; the cell has nothing else. */
+void lid_corners(struct dpoint_cell *cell, const struct lid *lid);
+
+/* Whether it stops each ray to the place p, in its rectangle's frame, whose cosine to `normal` is at least
+ * `least_cosine`: its quadric is so near to the place, leans so little and is so nearly flat there that all of them meet
+ * it well within its sides. `behind`: as for lid_stops. */
+int lid_stops_all(const struct lid *lid, const float p[3], const float normal[3], float least_cosine, float behind);
+
+/* Whether it is in the way of the ray that comes from direction `from` to the place p, in its rectangle's frame, or
+ * stops it at most `behind` after the place. */
+int lid_stops(const struct lid *lid, const float p[3], const float from[3], float behind);
+
+#endif
