@@ -36,12 +36,17 @@ static int add(struct crack *c, uint32_t x, uint32_t y)
 	return 1;
 }
 
+static int is_at_border(const struct psr_zstack *stack, uint32_t x, uint32_t y)
+{
+	return x == 0 || y == 0 || x + 1 == stack->width || y + 1 == stack->height;
+}
+
 /* Looks at what is around a pixel of the crack. Returns 0 if the crack reaches the border, or is too long. */
 static int look_around(struct crack *c, const struct plan *plan, const struct psr_zstack *stack, int k)
 {
 	const uint32_t x = c->at[k][0], y = c->at[k][1];
 
-	if (x == 0 || y == 0 || x + 1 == stack->width || y + 1 == stack->height)
+	if (is_at_border(stack, x, y))
 		return 0;
 	for (uint32_t v = y - 1; v <= y + 1; v++)
 		for (uint32_t u = x - 1; u <= x + 1; u++) {
@@ -94,15 +99,14 @@ static uint64_t nearest_beside(const struct psr_zstack *stack, uint32_t x, uint3
 	return nearest;
 }
 
-/* Whether a pixel is in a crack of at most `most` pixels, whose rims are within `apart` of its nearest neighbour, and
- * across which a surface goes on within `step`. */
-static int is_in(const struct plan *plan, const struct psr_zstack *stack, const uint32_t at[2], int most, float apart,
-                 float step)
+/* Whether the pixel that `begun` has is in a crack of at most `most` pixels, whose rims are within `apart` of its nearest
+ * neighbour, and across which a surface goes on within `step`. */
+static int is_in(const struct plan *plan, const struct psr_zstack *stack, const struct crack *begun, int most,
+                 float apart, float step)
 {
-	struct crack c = { .at = { { at[0], at[1] } }, .n = 1, .nearest = UINT64_MAX };
+	struct crack c = *begun;
 
-	c.own = depth_of(psr_zstack_row(stack, at[1])[at[0]]);
-	c.limit = depth_of(nearest_beside(stack, at[0], at[1])) + apart;
+	c.limit += apart;
 	for (int k = 0; k < c.n; k++)
 		if (!look_around(&c, plan, stack, k))
 			return 0;
@@ -116,12 +120,12 @@ static int is_in(const struct plan *plan, const struct psr_zstack *stack, const 
 
 int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
 {
-	const uint32_t at[2] = { x, y };
+	struct crack c = { .at = { { x, y } }, .n = 1, .nearest = UINT64_MAX };
 	uint32_t instance;
 	uint64_t near;
 	float spacing;
 
-	if (x == 0 || y == 0 || x + 1 == stack->width || y + 1 == stack->height)
+	if (is_at_border(stack, x, y))
 		return 0;
 	near = nearest_beside(stack, x, y);
 	if (near == PSR_WORD_EMPTY)
@@ -130,7 +134,9 @@ int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_
 	if (plan->warp[instance].points == NULL)
 		return 0;
 	spacing = plan->instance[instance].level_spacing;
-	return is_in(plan, stack, at, CRACK_MOST, CRACK_APART / 4 * spacing, CRACK_STEP * spacing)
-	       || is_in(plan, stack, at, CRACK_SHORT, CRACK_APART / 2 * spacing, CRACK_STEP * spacing)
-	       || is_in(plan, stack, at, 1, CRACK_APART * spacing, CRACK_STEP_ALONE * spacing);
+	c.own = depth_of(psr_zstack_row(stack, y)[x]);
+	c.limit = depth_of(near);
+	return is_in(plan, stack, &c, CRACK_MOST, CRACK_APART / 4 * spacing, CRACK_STEP * spacing)
+	       || is_in(plan, stack, &c, CRACK_SHORT, CRACK_APART / 2 * spacing, CRACK_STEP * spacing)
+	       || is_in(plan, stack, &c, 1, CRACK_APART * spacing, CRACK_STEP_ALONE * spacing);
 }

@@ -5,11 +5,11 @@
 
 #include "plan.h"
 
-/* A crack is one pixel wide, and of at most so many pixels that touch each other. All around is what is nearer by more
- * than level 1's threshold, the nearest of it a differential point, and so far apart in depth at most. A surface goes on
- * across each of its pixels: along a row, a column or a diagonal what is on both sides is nearly as deep. Measured:
- * openings that are there are seldom so small, and of their rims seldom two are so near to each other. Depths are in
- * spacings of the model's resolution. */
+/* A crack is one pixel wide, and of at most so many pixels that touch each other. The nearest pixel beside it is of a
+ * differential point. All around is what is nearer by more than level 1's threshold, and so far apart in depth at most:
+ * what is further behind that pixel is of the crack. A surface goes on across each of its pixels: along a row, a column
+ * or a diagonal what is on both sides is nearly as deep. Measured: openings that are there are seldom so small, and of
+ * their rims seldom two are so near to each other. Depths are in spacings of the model's resolution. */
 #define CRACK_MOST 12
 #define CRACK_SHORT 4
 #define CRACK_APART 48 /* of a pixel alone; half of it of a few, a quarter if the crack is longer than CRACK_SHORT */
