@@ -15,7 +15,7 @@
 #define INWARDS 0.9f
 #define BEHIND 6  /* of options->height: three samples of a mesh's resolution ([G] 7.2) */
 
-static const float slant[2] = { 0.65f, SEAL_LEAST_COSINE }; /* cosines of rays to the cell's normal */
+static const float slant[2] = { 0.65f, LID_LEAST_COSINE }; /* cosines of rays to the cell's normal */
 #define DIRECTIONS (1 + 2 * AROUND)
 
 struct sealing {
@@ -87,7 +87,7 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 		struct near_lid *near = &nearby->near[i];
 
 		rectangle_sees(near->place, &near->lid->rectangle, at);
-		if (lid_stops_all(near->lid, near->place, normal, SEAL_LEAST_COSINE, s->behind))
+		if (lid_stops_all(near->lid, near->place, normal, s->behind))
 			return 1;
 	}
 	for (int is_over = 1; is_over >= 0; is_over--)

@@ -4,9 +4,6 @@
 
 #include "rectangle.h"
 
-/* Cosine to the surface's normal of the flattest rays that are looked at: they graze it at 20 degrees. */
-#define SEAL_LEAST_COSINE 0.35f
-
 /* Quadrics over neighbouring places end at slightly different heights, so a slanted ray may pass over one and under the
  * other. Each cell is looked at along 17 rays to each of 9 places. Where one gets through, which nothing stops until six
  * times options->height behind the place, candidates that were left out are kept, those first that are over most such
