@@ -17,7 +17,7 @@
 #define WEIGHT_SETS (9 << 6)
 #define LEARN 6        /* of weights, in 2^-21 */
 #define SUM_LEARN 5    /* of the parts of a sum, in halves */
-#define MOST_PART (1 << 27) /* so that 14 of them add up in 32 bits */
+#define MOST_PART (1 << 27) /* so that 16 of them add up in 32 bits */
 #define EASY (65536 * 3 / 20) /* bits of a level were wrong by so much in the mean: the next needs no sums */
 
 /* Four numbers or eight, which the compiler has a register for on any machine that has some. */
@@ -298,7 +298,6 @@ ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_
 	uint64_t known = 0; /* children of neighbours that come earlier, and own ones so far */
 	struct coder coder = *job->coder; /* in registers */
 	unsigned so_far = 0;
-	struct around around = { 0, 0 };
 
 #pragma GCC unroll 27
 	for (unsigned k = 0; k < OCTREE_NEAR; k++) {
@@ -310,21 +309,19 @@ ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_
 	}
 	faces = (there >> 4 & 1) | (there >> 10 & 1) << 1 | (there >> 12 & 1) << 2 | (there >> 14 & 1) << 3 |
 	        (there >> 16 & 1) << 4 | (there >> 22 & 1) << 5;
-	around.there = there;
 	e = &model->e[scatter((uint64_t)there * 0x100000001b3u, E_BITS - 3) << 3];
 	__builtin_prefetch(e, 1);
 	find_slots(b, d, model, known, there, row, 0);
 #pragma GCC unroll 8
 	for (unsigned j = 0; j < 8; j++) {
 		const unsigned corner = (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2), begun = 1u << j | so_far;
-		const uint64_t window = known >> corner & WINDOW;
+		const struct around around = { there, known >> corner & WINDOW };
 		const uint32_t touched = touched_by(j, there);
 		uint32_t *p[CONTEXTS];
 		unsigned bit, set;
 
 		if (j == 4)
 			find_slots(b, d, model, known, there, row, 4);
-		around.window = window;
 		if (j == 7 && so_far == 0) { /* no code is 0 */
 			so_far = 128;
 			break;
