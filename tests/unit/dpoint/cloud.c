@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
+#include "base/grid.h"
 #include "base/maths.h"
 #include "base/random.h"
 #include "base/vec.h"
@@ -80,65 +81,25 @@ struct sampled {
 	uint64_t *attr;
 	struct dpoint_cloud cloud;
 	struct cloud_fit *fit;
-	double edge; /* of cells, which begin at -1.1 and hold points by lists */
-	uint32_t side, *first, *next;
 };
 
-#define NONE UINT32_MAX
-
-static uint32_t along(const struct sampled *s, double x)
+static void put_in_grid(struct grid *grid, uint32_t *next, const struct sampled *s, uint32_t i)
 {
-	const double cell = (x + 1.1) / s->edge;
+	const float p[3] = { (float)s->at[i][0], (float)s->at[i][1], (float)s->at[i][2] };
 
-	assert_true(cell >= 0 && cell < s->side);
-	return (uint32_t)cell;
+	assert_int_equal(grid_put(grid, p, i, &next[i]), PSR_OK);
 }
 
-static uint32_t *cell_of(const struct sampled *s, const uint32_t at[3])
+/* Lists the points of all cells that are within the radius of p. */
+static uint32_t list_near(uint32_t *list, const struct grid *grid, const uint32_t *next, const double place[3],
+                          double radius)
 {
-	return &s->first[((size_t)at[2] * s->side + at[1]) * s->side + at[0]];
-}
+	const float p[3] = { (float)place[0], (float)place[1], (float)place[2] };
+	uint32_t first[GRID_MOST_AROUND], n = 0;
 
-static void begin_cells(struct sampled *s, double edge, uint32_t most)
-{
-	s->edge = edge;
-	s->side = (uint32_t)(2.2 / edge) + 1;
-	s->first = malloc((size_t)s->side * s->side * s->side * sizeof *s->first);
-	s->next = malloc(most * sizeof *s->next);
-	memset(s->first, 0xff, (size_t)s->side * s->side * s->side * sizeof *s->first);
-}
-
-static void put_in_cell(struct sampled *s, uint32_t i)
-{
-	const uint32_t at[3] = { along(s, s->at[i][0]), along(s, s->at[i][1]), along(s, s->at[i][2]) };
-	uint32_t *first = cell_of(s, at);
-
-	s->next[i] = *first;
-	*first = i;
-}
-
-static void end_cells(struct sampled *s)
-{
-	free(s->first);
-	free(s->next);
-}
-
-/* Lists the points of all cells that are up to `reach` cells from that of p, in each of three ways. */
-static uint32_t list_near(uint32_t *list, const struct sampled *s, const double p[3], int reach)
-{
-	uint32_t low[3], high[3], at[3], n = 0;
-
-	for (int k = 0; k < 3; k++) {
-		const int cell = (int)along(s, p[k]);
-
-		low[k] = (uint32_t)(cell > reach ? cell - reach : 0);
-		high[k] = (uint32_t)(cell + reach < (int)s->side ? cell + reach : (int)s->side - 1);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
-				for (uint32_t i = *cell_of(s, at); i != NONE; i = s->next[i])
-					list[n++] = i;
+	for (int c = grid_around(grid, p, radius, first); c-- > 0;)
+		for (uint32_t i = first[c]; i != GRID_NONE; i = next[i])
+			list[n++] = i;
 	return n;
 }
 
@@ -146,12 +107,13 @@ static uint32_t list_near(uint32_t *list, const struct sampled *s, const double 
 static void sample(struct sampled *s, enum surface surface, double h, double noise)
 {
 	const uint32_t most = (uint32_t)(14 / (h * h));
-	uint32_t *near = malloc(most * sizeof *near);
+	uint32_t *near = malloc(most * sizeof *near), *next = malloc(most * sizeof *next);
+	struct grid grid;
 	uint64_t seed = 5;
 
 	s->n = 0;
 	s->at = malloc(most * sizeof *s->at);
-	begin_cells(s, h, most);
+	assert_int_equal(grid_init(&grid, h), PSR_OK);
 	for (int tries = 0; tries < 150000 && s->n < most; tries++) {
 		double p[3], normal[3];
 		int is_free = 1;
@@ -164,7 +126,7 @@ static void sample(struct sampled *s, enum surface surface, double h, double noi
 		}
 		if (fabs(value(surface, p)) > 1e-9 || fabs(p[0]) > 1 || fabs(p[1]) > 1 || fabs(p[2]) > 1)
 			continue;
-		for (uint32_t n = list_near(near, s, p, 1); n > 0 && is_free; n--) {
+		for (uint32_t n = list_near(near, &grid, next, p, h); n > 0 && is_free; n--) {
 			double away[3];
 
 			v3d_sub(away, s->at[near[n - 1]], p);
@@ -172,11 +134,12 @@ static void sample(struct sampled *s, enum surface surface, double h, double noi
 		}
 		if (is_free) {
 			memcpy(s->at[s->n], p, sizeof p);
-			put_in_cell(s, s->n++);
+			put_in_grid(&grid, next, s, s->n++);
 		}
 	}
-	end_cells(s);
+	grid_fini(&grid);
 	free(near);
+	free(next);
 	s->normal = malloc(s->n * sizeof *s->normal);
 	s->radius = malloc(s->n * sizeof *s->radius);
 	s->part = calloc(s->n, sizeof *s->part);
@@ -199,18 +162,19 @@ static void sample(struct sampled *s, enum surface surface, double h, double noi
 /* The nearest of each, the first of those that are as near. */
 static void find_near(struct sampled *s, double h)
 {
-	uint32_t *list = malloc(s->n * sizeof *list);
+	uint32_t *list = malloc(s->n * sizeof *list), *next = malloc(s->n * sizeof *next);
+	struct grid grid;
 
-	begin_cells(s, h, s->n);
+	assert_int_equal(grid_init(&grid, 2 * h), PSR_OK);
 	for (uint32_t i = 0; i < s->n; i++)
-		put_in_cell(s, i);
+		put_in_grid(&grid, next, s, i);
 	for (uint32_t i = 0; i < s->n; i++) {
 		double distance[DPOINT_MOST_NEAR];
 		uint32_t *near = &s->near[i * DPOINT_MOST_NEAR], n;
 
-		/* What is in no cell that is looked at is as far as these reach, and further. */
-		for (int reach = 3; n = 0, reach <= (int)s->side; reach++) {
-			for (uint32_t left = list_near(list, s, s->at[i], reach); left > 0; left--) {
+		/* What is in no cell that is looked at is as far as the radius; cells go by floats. */
+		for (double radius = 3 * h; n = 0, radius <= 8 * h; radius += h) {
+			for (uint32_t left = list_near(list, &grid, next, s->at[i], radius); left > 0; left--) {
 				const uint32_t j = list[left - 1];
 				double away[3], d;
 				uint32_t to;
@@ -228,13 +192,14 @@ static void find_near(struct sampled *s, double h)
 				distance[to] = d;
 				near[to] = j;
 			}
-			if (n == DPOINT_MOST_NEAR && distance[n - 1] < reach * s->edge * (reach * s->edge))
+			if (n == DPOINT_MOST_NEAR && sqrt(distance[n - 1]) < radius - 1e-6)
 				break;
 		}
 		assert_int_equal(n, DPOINT_MOST_NEAR);
 	}
-	end_cells(s);
+	grid_fini(&grid);
 	free(list);
+	free(next);
 	s->cloud = (struct dpoint_cloud){ s->n, DPOINT_MOST_NEAR, (const double (*)[3])s->at, (const float (*)[3])s->normal,
 		                              s->radius, s->near, s->part, s->attr };
 }
