@@ -39,7 +39,7 @@ LINK   += -fsanitize=address,undefined
 VECTORS :=
 TEST_O := -O0
 else ifeq ($(config),tsan)
-# At -O2 fewer accesses are left to look at, which tests gain and more than compiling loses.
+# At -O2 fewer accesses are left to look at: tests gain more than compiling loses.
 COMMON += -g1 -fsanitize=thread
 LINK   += -fsanitize=thread
 VECTORS :=

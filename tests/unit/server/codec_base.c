@@ -110,10 +110,10 @@ static void toggle_part(uint32_t column, uint32_t row)
 	trip.drawn.rgb[3 * (trip.drawn.width * (row * PSR_WIRE_PART_HEIGHT + 3) + column * PSR_WIRE_PART_WIDTH + 5)] ^= 1;
 }
 
-/* A strip of parts, X is changed:   X X . X
- *                                   X X X .
- *                                   X X . .
- *                                   . . . X   */
+/* A strip of parts, # is changed:   # # . #
+ *                                   # # # .
+ *                                   # # . .
+ *                                   . . . #   */
 static void changed_neighbours_are_one_rectangle(void **state)
 {
 	static const struct psr_msg_rect expected[] = {
@@ -121,7 +121,7 @@ static void changed_neighbours_are_one_rectangle(void **state)
 		{ .x = 0, .y = 160, .w = 384, .h = 32 }, { .x = 0, .y = 192, .w = 256, .h = 32 },
 		{ .x = 384, .y = 224, .w = 100, .h = 32 },
 	};
-	static const char *const rows[] = { "XX.X", "XXX.", "XX..", "...X" };
+	static const char *const rows[] = { "##.#", "###.", "##..", "...#" };
 
 	(void)state;
 	trip_ask(&trip, 484, 256, 1);
@@ -129,7 +129,7 @@ static void changed_neighbours_are_one_rectangle(void **state)
 	trip_go(&trip, 0);
 	for (uint32_t y = 0; y < 4; y++)
 		for (uint32_t x = 0; x < 4; x++)
-			if (rows[y][x] == 'X')
+			if (rows[y][x] == '#')
 				toggle_part(x, 4 + y);
 	trip_go(&trip, 1);
 	assert_int_equal(trip.n_rects, 5);
