@@ -15,7 +15,12 @@ struct cad_module_source {
 	double angle;           /* and surface normals turn by so much along a side, radians; both > 0 */
 	double rim;             /* above 0: faces come as patches, too, and sides of triangles along edges of faces are off the
 	                         * edge by so much at most, likewise as a part of the longest side */
+	double patch_deflection; /* with a rim: the first two of parts whose faces all are patches, which tell more of the
+	                          * surface than their triangles */
+	double patch_angle;
 	int most_degree;        /* of patches */
+	int n_threads;          /* that may cut faces, of all cores; other readings at the same time change it. The result does
+	                         * not depend on it */
 	uint64_t max_triangles;
 };
 
@@ -55,7 +60,7 @@ typedef int cad_module_read(struct cad_module_mesh **out, const struct cad_modul
 typedef void cad_module_destroy(struct cad_module_mesh *mesh); /* NULL is fine */
 
 /* The module exports one of these, named psr_cad_module. Raise the version with every change of this file. */
-#define CAD_MODULE_VERSION 3
+#define CAD_MODULE_VERSION 4
 struct cad_module {
 	uint32_t version; /* CAD_MODULE_VERSION of the module's own build; first in every version */
 	cad_module_read *read;

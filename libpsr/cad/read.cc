@@ -8,6 +8,7 @@
 #include <Standard_OutOfMemory.hxx>
 #include <BRepBndLib.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepTools.hxx>
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
 #include <IGESCAFControl.hxx>
@@ -19,6 +20,8 @@
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
+#include <OSD_Parallel.hxx>
+#include <OSD_ThreadPool.hxx>
 #include <Quantity_ColorRGBA.hxx>
 #include <STEPCAFControl_Reader.hxx>
 #include <STEPControl_Controller.hxx>
@@ -43,6 +46,31 @@ namespace {
 constexpr int MOST_DEPTH = 64;          // of assemblies
 constexpr size_t MOST_COLORS = 65000;
 constexpr double ALIKE = 1e-6;          // of the longest side: how far a NURBS may be from the surface that it stands for
+
+// How much there was before a part's faces.
+struct cad_count {
+	size_t n_vertices, n_triangles, n_patches, n_rims, n_patch_of;
+	uint32_t n_unlike, n_faces, n_left_out;
+
+	cad_count(const cad_triangles &t, const cad_patches &p, uint32_t faces, uint32_t left_out)
+		: n_vertices(t.vertex.size()), n_triangles(t.triangle.size()), n_patches(p.patch.size()), n_rims(p.rim.size()),
+		  n_patch_of(p.patch_of.size()), n_unlike(p.n_unlike), n_faces(faces), n_left_out(left_out)
+	{
+	}
+
+	void go_back(cad_triangles &t, cad_patches &p, uint32_t &faces, uint32_t &left_out) const
+	{
+		t.vertex.resize(n_vertices);
+		t.triangle.resize(n_triangles);
+		t.color_of.resize(n_triangles);
+		p.patch.resize(n_patches);
+		p.rim.resize(n_rims);
+		p.patch_of.resize(n_patch_of);
+		p.n_unlike = n_unlike;
+		faces = n_faces;
+		left_out = n_left_out;
+	}
+};
 
 struct walk {
 	Handle(XCAFDoc_ShapeTool) shapes;
@@ -80,6 +108,8 @@ struct walk {
 
 	void visit(const TDF_Label &label, const TopLoc_Location &location, uint32_t inherited, int depth);
 	void part(const TDF_Label &label, const TopLoc_Location &location, uint32_t inherited);
+	void faces(const TDF_Label &label, const TopoDS_Shape &shape, const TopLoc_Location &location, uint32_t inherited,
+	           const TopTools_DataMapOfShapeInteger &own);
 };
 
 std::string name_of(const TDF_Label &label)
@@ -97,15 +127,24 @@ std::string name_of(const TDF_Label &label)
 }
 
 // Sides along edges are finer than the faces between them, if patches are to end there.
-void cut(const TopoDS_Shape &shape, const cad_module_source &source, double longest_side)
+void cut(const TopoDS_Shape &shape, const cad_module_source &source, double longest_side, bool are_patches)
 {
 	IMeshTools_Parameters how;
-	how.Angle = how.AngleInterior = source.angle;
-	how.Deflection = how.DeflectionInterior = source.deflection * longest_side;
+	how.Angle = source.angle;
+	how.AngleInterior = are_patches ? source.patch_angle : source.angle;
+	how.Deflection = source.deflection * longest_side;
+	how.DeflectionInterior = are_patches ? source.patch_deflection * longest_side : how.Deflection;
 	if (source.rim > 0)
 		how.Deflection = std::min(source.rim, source.deflection) * longest_side;
-	how.InParallel = Standard_True; // face by face: the same triangles
+	how.InParallel = source.n_threads > 1; // face by face: the same triangles
 	BRepMesh_IncrementalMesh(shape, how);
+}
+
+// Open CASCADE may be built with threads of another library, which take all cores.
+void use_threads(int n)
+{
+	OSD_Parallel::SetUseOcctThreads(Standard_True);
+	OSD_ThreadPool::DefaultPool()->SetNbDefaultThreadsToLaunch(n);
 }
 
 void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_t inherited)
@@ -115,7 +154,6 @@ void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_
 	TDF_LabelSequence parts;
 	if (shape.IsNull())
 		return;
-	cut(shape, *source, longest_side);
 	XCAFDoc_ShapeTool::GetSubShapes(label, parts);
 	for (const bool is_face : { false, true })
 		for (TDF_LabelSequence::Iterator it(parts); it.More(); it.Next()) {
@@ -128,6 +166,23 @@ void walk::part(const TDF_Label &label, const TopLoc_Location &location, uint32_
 		}
 	for (TopExp_Explorer shell(shape, TopAbs_SHELL); shell.More(); shell.Next())
 		n_open += !BRep_Tool::IsClosed(shell.Current());
+	if (source->rim > 0) {
+		const cad_count before = { triangles, patches, n_faces, n_left_out };
+		cut(shape, *source, longest_side, true);
+		faces(label, shape, location, inherited, own);
+		if (patches.n_unlike == before.n_unlike && n_left_out == before.n_left_out)
+			return;
+		// Triangles stand for some of the faces.
+		before.go_back(triangles, patches, n_faces, n_left_out);
+		BRepTools::Clean(shape);
+	}
+	cut(shape, *source, longest_side, false);
+	faces(label, shape, location, inherited, own);
+}
+
+void walk::faces(const TDF_Label &label, const TopoDS_Shape &shape, const TopLoc_Location &location, uint32_t inherited,
+                 const TopTools_DataMapOfShapeInteger &own)
+{
 	for (TopExp_Explorer it(shape, TopAbs_FACE); it.More(); it.Next()) {
 		const int *c = own.Seek(it.Current());
 		if (c == nullptr)
@@ -293,6 +348,7 @@ void read(cad_module_mesh *out, const cad_module_source *source)
 	IGESControl_Controller::Init();
 	STEPControl_Controller::Init();
 	Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+	use_threads(source->n_threads);
 	w.number({ 0, 0, 0, -1 });
 	if (source->is_iges) {
 		IGESCAFControl_Reader reader;

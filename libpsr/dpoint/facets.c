@@ -91,6 +91,7 @@ int facets_sort(struct facets *facets)
 	struct facet *sorted = malloc((facets->n + 1) * sizeof *sorted);
 	size_t n_nodes = 1;
 
+	free(facets->node);
 	for (size_t leaves = LEAF; leaves < facets->n; leaves *= 2)
 		n_nodes = 2 * n_nodes + 1;
 	facets->node = malloc(n_nodes * sizeof *facets->node);

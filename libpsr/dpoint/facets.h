@@ -21,7 +21,8 @@ struct facets {
 };
 
 int facets_add(struct facets *facets, const float a[3], const float b[3], const float c[3]); /* MEMORY */
-int facets_sort(struct facets *facets); /* when all are there: in the order of a Morton curve. MEMORY */
+int facets_sort(struct facets *facets); /* when all are there, and again after others: in the order of a Morton curve.
+                                         * MEMORY */
 void facets_fini(struct facets *facets); /* zeros are fine */
 
 /* Calls fn for runs of facets, so that each facet whose box meets `box` is in one of them. Ends where fn returns

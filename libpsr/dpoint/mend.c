@@ -7,12 +7,13 @@
 #include "choice.h"
 #include "rectangle.h"
 
-/* The longest side of a cell, and across it: half of what the cell takes of both, from its middle on. is_own: with the
- * normal of its plane, and not that of the surface. */
-static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell, int is_own)
+/* Along a side of a cell, and across it: half of what the cell takes of both, from its middle on. next: the side comes so
+ * many after the longest. is_own: with the normal of the cell's plane, and not that of the surface. */
+static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell, int next,
+                         int is_own)
 {
 	double side[4][3], diagonal[2][3], most = 0;
-	int longest = 0;
+	int along = 0;
 
 	memset(local, 0, sizeof *local);
 	memset(extent, 0, 2 * sizeof *extent);
@@ -26,8 +27,9 @@ static int local_of_cell(struct dpoint_local *local, double extent[2], const str
 	for (int c = 0; c < 4; c++)
 		if (v3d_dot(side[c], side[c]) > most) {
 			most = v3d_dot(side[c], side[c]);
-			longest = c;
+			along = c;
 		}
+	along = (along + next) % 4;
 	if (is_own || v3d_dot(local->axis[2], local->axis[2]) == 0) {
 		double normal[3];
 
@@ -36,7 +38,7 @@ static int local_of_cell(struct dpoint_local *local, double extent[2], const str
 	}
 	if (v3d_normalize(local->axis[2], local->axis[2]) == 0)
 		return 0;
-	v3d_add_scaled(local->axis[0], side[longest], -v3d_dot(side[longest], local->axis[2]), local->axis[2]);
+	v3d_add_scaled(local->axis[0], side[along], -v3d_dot(side[along], local->axis[2]), local->axis[2]);
 	if (v3d_normalize(local->axis[0], local->axis[0]) == 0)
 		return 0;
 	v3d_cross(local->axis[1], local->axis[2], local->axis[0]);
@@ -53,13 +55,13 @@ static int local_of_cell(struct dpoint_local *local, double extent[2], const str
 
 /* Rounding turns the sides of a rectangle by pi / 256, and tilts it by a triangle of normals: 0.015 at most. */
 static enum dpoint_made flat_patch(struct dpoint_candidate *out, const struct dpoint_surface *surface, uint32_t at,
-                                   const struct dpoint_cover_options *options, int is_own)
+                                   const struct dpoint_cover_options *options, int next, int is_own)
 {
 	const struct dpoint_cell *cell = &surface->cell[at];
 	struct dpoint_local local;
 	double extent[2];
 	struct dpoint_candidate like = { .point.attr = cell->attr, .part = cell->part, .cell = at };
-	int is_good = local_of_cell(&local, extent, cell, is_own);
+	int is_good = local_of_cell(&local, extent, cell, next, is_own);
 
 	for (int k = 0; k < 2; k++) {
 		const double reach = extent[k] + 0.015 * (extent[0] + extent[1]) + 1.01 * options->slack;
@@ -70,21 +72,23 @@ static enum dpoint_made flat_patch(struct dpoint_candidate *out, const struct dp
 	return dpoint_candidate_make(out, is_good ? &local : NULL, &like);
 }
 
+/* Kinds of patches over a cell. From SECOND on they are as the flat one, along other sides. */
+enum kind { BENT, FLAT, OWN, SECOND, THIRD, FOURTH, N_KINDS };
+
 struct mending {
 	struct dpoint_surface *surface;
 	const struct dpoint_cover_options *options;
 	const struct tally *tally;
 	uint32_t *own;           /* the candidate of each cell, or UINT32_MAX; NULL: patches are flat */
+	double error;            /* that patches should be within; 0: the first kind will do */
+	enum kind n_kinds;       /* those before it are tried */
 	struct bound_view view;
 };
-
-/* Kinds of patches over a cell. */
-enum kind { BENT, FLAT, OWN, N_KINDS };
 
 static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint32_t at, enum kind kind)
 {
 	if (kind != BENT)
-		return flat_patch(out, m->surface, at, m->options, kind == OWN) != DPOINT_BAD;
+		return flat_patch(out, m->surface, at, m->options, kind > OWN ? kind - OWN : 0, kind == OWN) != DPOINT_BAD;
 	if (m->own[at] == UINT32_MAX)
 		return 0;
 	*out = m->surface->candidate[m->own[at]];
@@ -92,12 +96,12 @@ static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint3
 }
 
 static double error_of(struct bound_view *view, const struct dpoint_surface *surface, const struct dpoint_candidate *c,
-                       const struct dpoint_cover_options *options)
+                       const struct dpoint_cover_options *options, double least)
 {
 	float extent[2];
 
 	dpoint_candidate_extent(extent, c, options->sine);
-	return bound_least(view, &surface->facets, &c->point, extent, (double)options->error);
+	return bound_least(view, &surface->facets, &c->point, extent, least);
 }
 
 /* Finds the first kind of patch that is within the error, or the nearest. Returns 0 where none is near the surface at
@@ -108,13 +112,13 @@ static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mendi
 	double least = INFINITY;
 
 	*is_bad = 1;
-	for (enum kind kind = BENT; kind < N_KINDS && least > (double)m->options->error && !m->view.is_failed; kind++) {
+	for (enum kind kind = BENT; kind < m->n_kinds && least > m->error && !m->view.is_failed; kind++) {
 		double error;
 
 		if (!patch_of(&patch, m, at, kind))
 			continue;
 		*is_bad = 0;
-		error = error_of(&m->view, m->surface, &patch, m->options);
+		error = error_of(&m->view, m->surface, &patch, m->options, m->error);
 		if (error < least) {
 			least = error;
 			*out = patch;
@@ -128,7 +132,7 @@ static int put_patch(struct mending *m, uint32_t at)
 	struct dpoint_candidate patch, *candidate;
 	int is_there, is_bad;
 
-	if (m->options->error > 0) {
+	if (m->error > 0) {
 		is_there = bounded_patch(&patch, &is_bad, m, at);
 	} else {
 		is_there = (m->own != NULL && patch_of(&patch, m, at, BENT)) || patch_of(&patch, m, at, FLAT);
@@ -190,7 +194,8 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 {
 	const struct dpoint_work work = { pool, cancel };
 	struct tally tally;
-	struct mending m = { .surface = surface, .options = options, .tally = &tally };
+	struct mending m = { .surface = surface, .options = options, .tally = &tally, .error = (double)options->error,
+		                 .n_kinds = OWN + 1 };
 	int rc;
 
 	if (cover->tree == NULL)
@@ -198,7 +203,12 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	rc = tally_init(&tally, cover);
 	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
 		tally_add(&tally, i, 1);
-	if (rc == PSR_OK && (options->error > 0 || surface->is_cloud))
+	/* Rims cut cells of patches to slanted pieces: a rectangle along the longest side of such a one may go far beyond. */
+	if (surface->margin > 0 && !(options->error > 0)) {
+		m.error = 0.25 * (double)options->height;
+		m.n_kinds = N_KINDS;
+	}
+	if (rc == PSR_OK && (m.error > 0 || surface->is_cloud))
 		rc = find_own(&m);
 	if (rc == PSR_OK)
 		rc = patch_below(&m, 0);
@@ -217,8 +227,8 @@ int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, cons
 	for (uint32_t i = 0; i < surface->n_cells && rc == PSR_OK; i++) {
 		struct dpoint_candidate plane, *candidate;
 
-		if (!is_open[i] || flat_patch(&plane, surface, i, options, 1) == DPOINT_BAD ||
-		    (options->error > 0 && !(error_of(&view, surface, &plane, options) <= (double)options->error)))
+		if (!is_open[i] || flat_patch(&plane, surface, i, options, 0, 1) == DPOINT_BAD ||
+		    (options->error > 0 && !(error_of(&view, surface, &plane, options, (double)options->error) <= (double)options->error)))
 			continue;
 		candidate = view.is_failed ? NULL : dpoint_surface_candidate(surface);
 		if (candidate == NULL)

@@ -60,7 +60,7 @@ static int refuse_pieces(const struct dpoint_mesh_options *options, struct psr_e
 	                is_bounded(options) ? ", a greater error" : "");
 }
 
-/* A triangle of a patch is no more than a facet: dpoint_sample_trimmed() has its pieces. */
+/* dpoint_sample_trimmed() has the pieces of a patch, and its facets. */
 static int is_of_patch(const struct psr_mesh *mesh, uint32_t t)
 {
 	return mesh->triangle_patch != NULL && mesh->triangle_patch[t] != UINT32_MAX;
@@ -131,6 +131,8 @@ static int put_facets(struct cutting *c, const struct corners *corners, const st
 
 	dpoint_surface_init(&pieces);
 	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
+		if (is_of_patch(mesh, t))
+			continue;
 		look_at(c, corners, mesh, t);
 		if (c->options->look != NULL && mesh->material[c->material].alpha != PSR_ALPHA_OPAQUE)
 			rc = put_pieces_as_facets(c->surface, &pieces, c);

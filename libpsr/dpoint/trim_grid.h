@@ -60,6 +60,10 @@ void trim_place(double at[3], const struct trim_grid *grid, const uint32_t cell[
 int trim_local(struct dpoint_local *local, const struct trim_grid *grid, const uint32_t cell[2], const double uv[2],
                const struct dpoint_trimmed_options *options);
 
+/* trim_facets.c: adds the facets of struct dpoint_trimmed_options. MEMORY, LIMIT. */
+int trim_put_facets(struct dpoint_surface *surface, const struct trim_grid *grid, const struct psr_patch *patch,
+                    const struct dpoint_trimmed_options *options);
+
 /* trim_rims.c: adds the hems and strips of struct dpoint_trimmed_options. MEMORY, LIMIT. */
 int trim_put_rims(struct dpoint_surface *surface, const struct trim_grid *grid, const struct psr_patch *patch,
                   const struct dpoint_trimmed_options *options);

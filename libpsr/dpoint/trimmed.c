@@ -334,6 +334,8 @@ int dpoint_sample_trimmed(struct dpoint_surface *surface, const struct psr_patch
 		rc = put_inside(&s);
 	if (rc == PSR_OK)
 		rc = trim_put_rims(surface, &s.grid, patch, options);
+	if (rc == PSR_OK && options->facet > 0)
+		rc = trim_put_facets(surface, &s.grid, patch, options);
 	trim_fini(&s.grid);
 	if (rc == PSR_ERR_LIMIT)
 		return dpoint_trimmed_refuse(options->cell, err);

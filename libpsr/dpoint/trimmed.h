@@ -10,6 +10,8 @@ struct dpoint_trimmed_options {
 	double cell;             /* sides of cells, inner units: at most about this */
 	double turn;             /* and normals turn by at most about this along a side, radians; both > 0 */
 	double hem;              /* cells reach so far beyond rims, inner units */
+	double facet;            /* above 0: there are facets, whose sides are off the surface by so much at most, inner
+	                          * units */
 	float delta;             /* the most that a rectangle may reach */
 	uint64_t attr;           /* of all points, without a normal */
 };

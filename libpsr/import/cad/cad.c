@@ -8,6 +8,9 @@
 
 #define PER_PIXEL 8       /* triangles are off by this part of a pixel of the model */
 #define ANGLE 0.2         /* radians: colours and highlights between corners stay smooth */
+/* Triangles of patches tell how large the model is, and where patches end. */
+#define PATCH_PER_PIXEL 2
+#define PATCH_ANGLE 0.6
 /* Faces that meet end at straight sides of their own between the same places. What differential points cover beyond such
  * a side (dpoint/trimmed.h) is twice as wide. */
 #define RIM 2.5e-5
@@ -188,7 +191,9 @@ int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 	const struct cad_module_source source = {
 		.path = im->path, .is_iges = !is_step(im->path, bytes, n_bytes), .angle = ANGLE,
 		.deflection = 1.0 / (PER_PIXEL * (double)im->options.resolution),
-		.rim = im->options.has_patches && !im->options.is_preview ? RIM : 0, .most_degree = DPOINT_MOST_DEGREE,
+		.rim = im->options.has_patches && !im->options.is_preview ? RIM : 0,
+		.patch_deflection = 1.0 / (PATCH_PER_PIXEL * (double)im->options.resolution), .patch_angle = PATCH_ANGLE,
+		.most_degree = DPOINT_MOST_DEGREE, .n_threads = im->options.n_threads,
 		.max_triangles = IMPORT_MAX_TRIANGLES / 4,
 	};
 	const struct cad_module *module;

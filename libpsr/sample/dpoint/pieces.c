@@ -13,6 +13,8 @@
 
 #define HEM 1e-4f         /* twice of what rims of patches are off at most (import/cad) */
 #define TURN 0.6          /* of epsilon's sine: normals turn by so much along the side of a mesh's piece (0155) */
+#define PER_PIXEL 8       /* facets of patches are off by this part of a pixel */
+#define PER_ERROR 4       /* and by this part of an error that is asked for */
 #define MARGIN 0.08f      /* of points of patches: from 2 degrees aslant no step between flat ones shows (0139) */
 
 /* The look of a place in the middle of a piece, filtered over the piece; *attr without a normal. */
@@ -115,13 +117,21 @@ static void find_looks(struct parts *p)
 		p->part[i].rc = PSR_OK;
 }
 
+/* How far facets may be from the surface. */
+static double facet_of(const struct dpoint_build_options *o)
+{
+	const double pixels = o->error > 0 ? fmin(1.0 / PER_PIXEL, o->error / PER_ERROR) : 1.0 / PER_PIXEL;
+
+	return pixels * 2.0 / o->resolution;
+}
+
 static void sample_patch(struct parts *p, struct part *part)
 {
 	const struct psr_model_info *info = p->b->info;
 	const struct dpoint_trimmed_options o = {
 		.origin = { info->origin[0], info->origin[1], info->origin[2] }, .scale = 1 / info->scale,
 		.cell = p->b->options->piece, .turn = 0.5 * (double)p->cover.sine, .delta = p->cover.delta,
-		.hem = (double)fminf(HEM, 0.5f * p->cover.overhang), .attr = part->attr,
+		.hem = (double)fminf(HEM, 0.5f * p->cover.overhang), .facet = facet_of(p->b->options), .attr = part->attr,
 	};
 
 	if (part->patch == NULL || __atomic_load_n(&p->n_cells, __ATOMIC_RELAXED) > TRIM_MOST_CELLS)
@@ -153,7 +163,7 @@ static void sample(int i, void *userdata)
 		sample_patch(p, &p->part[i - 1]);
 }
 
-/* Adds a part's cells and candidates after those that are there. */
+/* Adds a part's cells, candidates and facets after those that are there. */
 static int append(struct dpoint_surface *to, const struct dpoint_surface *from)
 {
 	const uint32_t first = (uint32_t)to->n_cells;
@@ -172,6 +182,12 @@ static int append(struct dpoint_surface *to, const struct dpoint_surface *from)
 			return PSR_ERR_MEMORY;
 		*candidate = from->candidate[i];
 		candidate->cell += first;
+	}
+	for (size_t i = 0; i < from->facets.n; i++) {
+		const float (*corner)[3] = (const float (*)[3])from->facets.facet[i].corner;
+
+		if (facets_add(&to->facets, corner[0], corner[1], corner[2]) != PSR_OK)
+			return PSR_ERR_MEMORY;
 	}
 	to->n_bad += from->n_bad;
 	to->n_clamped += from->n_clamped;
@@ -195,8 +211,10 @@ static int join(struct parts *p)
 		rc = append(&b->surface, &p->part[i].surface);
 		dpoint_surface_fini(&p->part[i].surface);
 	}
-	if (p->n > 0)
+	if (p->n > 0) {
 		b->surface.margin = MARGIN;
+		rc = rc == PSR_OK ? facets_sort(&b->surface.facets) : rc;
+	}
 	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "no memory for the pieces of %u patches", p->n);
 }
 

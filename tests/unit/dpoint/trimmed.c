@@ -124,6 +124,64 @@ static void check_area(const struct dpoint_surface *surface, double area, double
 		fail_msg("%.9g, not %.9g", found, area);
 }
 
+/* Facets of a body that is turned around z cover it, and are nowhere further off than they may be: their sides are that
+ * near, and a triangle is at most 4/3 as far off as its worst side; places are floats. */
+static void check_facets(const struct trimmed *t, double most, double area, double (*off)(const double at[3]))
+{
+	struct dpoint_trimmed_options o = options(0.05);
+	struct dpoint_surface surface;
+	double found = 0;
+
+	o.facet = most;
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_trimmed(&surface, &t->patch, &o, NULL), PSR_OK);
+	for (size_t i = 0; i < surface.facets.n; i++) {
+		const float (*corner)[3] = (const float (*)[3])surface.facets.facet[i].corner;
+		float a[3], b[3], n[3];
+
+		v3f_sub(a, corner[1], corner[0]);
+		v3f_sub(b, corner[2], corner[0]);
+		v3f_cross(n, a, b);
+		found += 0.5 * (double)v3f_length(n);
+		for (int part = 0; part < 28; part++) {
+			const int u = part % 7, v = part / 7;
+			double at[3];
+
+			for (int k = 0; k < 3 && u + v <= 6; k++)
+				at[k] = (double)corner[0][k] + (double)(u * a[k] + v * b[k]) / 6;
+			if (u + v <= 6 && !(fabs(off(at)) <= 4.0 / 3 * most + 1e-6))
+				fail_msg("%zu of %zu: %g, not %g", i, surface.facets.n, off(at), most);
+		}
+	}
+	/* Inside by `most` of a radius of 0.25, along and across. */
+	assert_true(found <= area * (1 + 1e-5) && found >= area * (1 - 4 * most / 0.25));
+	dpoint_surface_fini(&surface);
+}
+
+static double off_plane(const double at[3])
+{
+	return at[2];
+}
+
+static double off_cylinder(const double at[3])
+{
+	return hypot(at[0], at[1]) - 0.25;
+}
+
+static void facets_are_as_near_as_asked(void **state)
+{
+	struct revolved s;
+	struct trimmed t;
+
+	(void)state;
+	cylinder(&s, 0.25);
+	take_whole(&t, &s.patch);
+	for (double most = 1e-2; most > 1e-5; most /= 3)
+		check_facets(&t, most, M_PI, off_cylinder);
+	take_plate(&t, 0.5, 48);
+	check_facets(&t, 1e-4, 4 - 0.5 * 48 * 0.25 * sin(2 * M_PI / 48), off_plane);
+}
+
 /* Places are floats, and words of curvatures a factor of 2^(1/12) off. */
 static void check_point(const struct dpoint *p, double away, double lambda, double rho)
 {
@@ -364,6 +422,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(whole_surfaces_are_covered_by_points_of_their_curvatures),
+		cmocka_unit_test(facets_are_as_near_as_asked),
 		cmocka_unit_test(a_plate_with_a_hole_is_covered_up_to_its_rim),
 		cmocka_unit_test(rectangles_end_at_rims_and_leave_no_hole),
 		cmocka_unit_test(creases_run_along_cells),

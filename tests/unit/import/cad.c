@@ -197,6 +197,59 @@ static void faces_are_patches_on_request(void **state)
 	psr_mesh_destroy(mesh);
 }
 
+/* A face of degree 16, which no patch may have: z = -24 v (1 - v) (1 - x / 8)^16 over 16 x 8, with y = 8 v. Its triangles
+ * are what there is, so they are off by an eighth of a pixel at most, also where patches were asked for; those of patches
+ * are coarser. Open CASCADE looks at middles of triangles, which are off by 4/9 of what their sides are together: a side
+ * by 3/2 of it, if another one is as long, as curvature measures them, and both make up the third. */
+static void faces_without_a_patch_have_fine_triangles(void **state)
+{
+	struct psr_import_options options;
+	struct psr_mesh *mesh = NULL;
+	double worst = 0;
+
+	(void)state;
+	if (!has_module)
+		skip();
+	psr_import_options_default(&options);
+	options.has_patches = 1;
+	options.resolution = 256;
+	assert_int_equal(psr_mesh_import(&mesh, "tests/data/import/wave.step", &options, NULL), PSR_OK);
+	assert_int_equal(mesh->n_patches, 0);
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		for (int i = 0; i < 3; i++) {
+			const double *a = mesh->position[mesh->triangle[t][i]], *b = mesh->position[mesh->triangle[t][(i + 1) % 3]];
+			const double x = 1 - (a[0] + b[0]) / 16, v = (a[1] + b[1]) / 16, across = 24 * v * (1 - v);
+			const double along_x = 2 * across * pow(x, 15), along_y = 3 * (1 - 2 * v) * pow(x, 16);
+
+			worst = fmax(worst, fabs((a[2] + b[2]) / 2 + across * pow(x, 16)) / sqrt(1 + along_x * along_x + along_y * along_y));
+		}
+	if (!(worst <= 1.5 * 16.0 / 256 / 8))
+		fail_msg("%g", worst);
+	psr_mesh_destroy(mesh);
+}
+
+/* By one thread and by two. */
+static void threads_change_nothing(void **state)
+{
+	struct psr_import_options options;
+	struct psr_mesh *mesh[2] = { NULL, NULL };
+
+	(void)state;
+	if (!has_module)
+		skip();
+	psr_import_options_default(&options);
+	options.has_patches = 1;
+	for (int i = 0; i < 2; i++) {
+		options.n_threads = i + 1;
+		assert_int_equal(psr_mesh_import(&mesh[i], "tests/data/import/pins.step", &options, NULL), PSR_OK);
+	}
+	assert_true(mesh[0]->n_triangles == mesh[1]->n_triangles && mesh[0]->n_vertices == mesh[1]->n_vertices);
+	assert_memory_equal(mesh[0]->triangle, mesh[1]->triangle, mesh[0]->n_triangles * sizeof *mesh[0]->triangle);
+	assert_memory_equal(mesh[0]->position, mesh[1]->position, mesh[0]->n_vertices * sizeof *mesh[0]->position);
+	psr_mesh_destroy(mesh[0]);
+	psr_mesh_destroy(mesh[1]);
+}
+
 static void expect_end(const char *path, const char *name, const char *why)
 {
 	uint8_t *bytes = NULL;
@@ -259,6 +312,8 @@ int main(void)
 		cmocka_unit_test(poles_are_no_faces_without_area),
 		cmocka_unit_test(a_finer_model_has_more_triangles),
 		cmocka_unit_test(faces_are_patches_on_request),
+		cmocka_unit_test(faces_without_a_patch_have_fine_triangles),
+		cmocka_unit_test(threads_change_nothing),
 		cmocka_unit_test(a_file_that_ends_in_the_middle_is_told),
 		cmocka_unit_test(other_contents_are_told),
 	};
