@@ -8,34 +8,38 @@
 
 #define MARGIN SMOOTH_REACH
 #define ROWS (2 * MARGIN + 1)
+#define SMOOTH_RUN 16 /* pixels together; _Static_assert below */
 
 /* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane:
  * 1 / z' in perspective, else -z'. NaN outside of the picture: every comparison fails. */
 struct smooth_row {
 	float near[SMOOTH_WIDTH + 2 * MARGIN], limit[SMOOTH_WIDTH + 2 * MARGIN];
-	int32_t light[3][SMOOTH_WIDTH + 2 * MARGIN]; /* squared codes, close to linear */
+	int32_t light[3][SMOOTH_WIDTH + 2 * MARGIN]; /* squared codes, close to linear; of the row and those beside it */
 	int32_t is_empty;
 };
+_Static_assert(SMOOTH_WIDTH % SMOOTH_RUN == 0, "runs may reach beyond the last pixel, not beyond a row");
 
-static void clear_smooth_row(struct smooth_row *row, uint32_t first, uint32_t end)
-{
-	for (uint32_t i = first; i < end; i++) {
-		row->near[i] = row->limit[i] = NAN;
-		row->light[0][i] = row->light[1][i] = row->light[2][i] = 0;
-	}
-}
+/* Of a row, what is in the picture: at[i] of its first pixel and its margin, first <= i < end. */
+struct smooth_span {
+	size_t first, end;
+	ptrdiff_t at;
+};
 
-static void load_smooth_row(struct smooth_row *row, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
+static struct smooth_span smooth_span_of(const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
 {
 	const int is_inside = y >= 0 && y < (int64_t)t->height;
-	const uint32_t first = x0 < MARGIN ? MARGIN - x0 : 0, left = t->width - x0, all = n + 2 * MARGIN;
-	const uint32_t end = is_inside ? (left + MARGIN < all ? left + MARGIN : all) : first;
-	const ptrdiff_t at = (ptrdiff_t)(is_inside ? y : 0) * t->width + x0 - MARGIN;
-	const uint8_t *code = t->from + 3 * at;
-	const float *z = t->depth + at;
+	const size_t first = x0 < MARGIN ? MARGIN - x0 : 0, left = t->width - x0, all = n + 2 * MARGIN;
+	const size_t end = left + MARGIN < all ? left + MARGIN : all;
+
+	return (struct smooth_span){ first, is_inside ? end : first, (ptrdiff_t)(is_inside ? y : 0) * t->width + x0 - MARGIN };
+}
+
+static void load_nearness(struct smooth_row *row, const struct smooth_target *t, const struct smooth_span *in)
+{
+	const float *z = t->depth + in->at;
 	int32_t has_any = 0;
 
-	for (uint32_t i = first; i < end; i++) {
+	for (size_t i = in->first; i < in->end; i++) {
 		const float near = t->perspective ? 1 / z[i] : -z[i];
 
 		row->near[i] = near;
@@ -43,15 +47,27 @@ static void load_smooth_row(struct smooth_row *row, const struct smooth_target *
 		has_any |= z[i] < INFINITY;
 	}
 	row->is_empty = !has_any;
-	for (uint32_t i = first; i < end; i++) {
+	for (size_t i = 0; i < in->first; i++)
+		row->near[i] = row->limit[i] = NAN;
+	for (size_t i = in->end; i < SMOOTH_WIDTH + 2 * MARGIN; i++)
+		row->near[i] = row->limit[i] = NAN;
+}
+
+static void load_light(struct smooth_row *row, const struct smooth_target *t, const struct smooth_span *in)
+{
+	const uint8_t *code = t->from + 3 * in->at;
+
+	for (size_t i = in->first; i < in->end; i++) {
 		const int32_t r = code[3 * i], g = code[3 * i + 1], b = code[3 * i + 2];
 
 		row->light[0][i] = r * r;
 		row->light[1][i] = g * g;
 		row->light[2][i] = b * b;
 	}
-	clear_smooth_row(row, 0, first);
-	clear_smooth_row(row, end, all);
+	for (int c = 0; c < 3; c++) {
+		memset(row->light[c], 0, in->first * sizeof *row->light[c]);
+		memset(row->light[c] + in->end, 0, (SMOOTH_WIDTH + 2 * MARGIN - in->end) * sizeof *row->light[c]);
+	}
 }
 
 /* Masks of the neighbours that count. */
@@ -69,12 +85,47 @@ static inline int32_t add_corners(const int32_t *a, const int32_t *b, const stru
 	return ((a[-1] & m->corner[0]) + (a[1] & m->corner[1])) + ((b[-1] & m->corner[2]) + (b[1] & m->corner[3]));
 }
 
+static inline int32_t smooth_code(float light)
+{
+	return (int32_t)(__builtin_sqrtf(light) + 0.5f);
+}
+
+/* Whether no neighbour of a run of pixels lies behind, and those on their sides are of the same surface, even if it
+ * may not fall. `row` points to the middle one of ROWS here and below; the run begins at its `first`. */
+static inline int32_t is_smooth_surface(const struct smooth_row *const *row, size_t first)
+{
+	const float *up = row[-1]->near, *own = row[0]->near, *down = row[1]->near;
+	const float *up_limit = row[-1]->limit, *own_limit = row[0]->limit, *down_limit = row[1]->limit;
+	int32_t is_one = 1;
+
+	for (size_t i = first; i < first + SMOOTH_RUN; i++) {
+		const float near = own[i], limit = own_limit[i];
+
+		is_one &= (up[i - 1] >= limit) & (up[i] >= limit) & (up[i + 1] >= limit) & (own[i - 1] >= limit)
+		          & (own[i + 1] >= limit) & (down[i - 1] >= limit) & (down[i] >= limit) & (down[i + 1] >= limit)
+		          & (near >= up_limit[i]) & (near >= down_limit[i]) & (near >= own_limit[i - 1])
+		          & (near >= own_limit[i + 1]);
+	}
+	return is_one;
+}
+
+static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row)
+{
+	for (int c = 0; c < 3; c++) {
+		const int32_t *a = row[-1]->light[c] + MARGIN + x, *o = row[0]->light[c] + MARGIN + x;
+		const int32_t *b = row[1]->light[c] + MARGIN + x;
+
+		for (ptrdiff_t i = 0; i < SMOOTH_RUN; i++)
+			code[c][x + (size_t)i] = smooth_code((float)(4 * o[i] + ((a[i] + b[i]) + (o[i - 1] + o[i + 1]))) * (1 / 8.0f));
+	}
+}
+
 /* How much a surface falls over the two pixels before and after a step from a pixel to the next: the lesser of both, 0
  * where it rises on a side; negative where it rises on both. The surface may fall by so much in the step. */
-static void smooth_falls(float *restrict fall, const float *near2, const float *near, const float *next,
-                         const float *next2, uint32_t n)
+static inline void smooth_falls(float *restrict fall, const float *near2, const float *near, const float *next,
+                                const float *next2, size_t n)
 {
-	for (uint32_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < n; i++) {
 		const float before = near2[i] - near[i], after = next[i] - next2[i];
 		const int is_less = before < after;
 		const float least = psr_choose(is_less, before, after), most = psr_choose(is_less, after, before);
@@ -82,12 +133,6 @@ static void smooth_falls(float *restrict fall, const float *near2, const float *
 		fall[i] = psr_choose(least > 0, least, psr_where(most < 0, most));
 	}
 }
-
-/* The falls beside a row: [i] of the step from pixel i to the next one right; and down from a row to the next, by the
- * parity of the upper row. */
-struct smooth_steps {
-	float right[SMOOTH_WIDTH + 2 * MARGIN], vertical[2][SMOOTH_WIDTH + 2 * MARGIN];
-};
 
 static inline float down_by(float fall)
 {
@@ -100,19 +145,25 @@ static inline int32_t is_same(float fall, float rise, float near, float limit, f
 	return -((other >= limit - fall) & (near >= others_limit - rise));
 }
 
-/* Returns how many pixels have a neighbour behind. `row` points to the middle one of ROWS. */
-static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *const *row, const float *rightward,
-                              const float *downward, const float *from_above, uint32_t n)
+/* Returns how many pixels have a neighbour behind. */
+static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row)
 {
+	const size_t first = x + MARGIN;
 	const struct smooth_row *up = row[-1], *own = row[0], *down = row[1];
-	uint32_t n_edges = 0;
+	const float *near_own = own->near + first;
+	float rightward[SMOOTH_RUN + 1], downward[SMOOTH_RUN], from_above[SMOOTH_RUN];
+	int32_t n_edges = 0;
 
-	for (uint32_t i = MARGIN; i < n + MARGIN; i++) {
+	smooth_falls(rightward, near_own - 3, near_own - 1, near_own, near_own + 2, SMOOTH_RUN + 1);
+	smooth_falls(downward, row[-2]->near + first, near_own, down->near + first, row[3]->near + first, SMOOTH_RUN);
+	smooth_falls(from_above, row[-3]->near + first, up->near + first, near_own, row[2]->near + first, SMOOTH_RUN);
+	for (size_t k = 0; k < SMOOTH_RUN; k++) {
+		const size_t i = first + k;
 		const float near = own->near[i], limit = own->limit[i];
-		const float right = down_by(rightward[i]), right_up = down_by(-rightward[i]);
-		const float left = down_by(-rightward[i - 1]), left_up = down_by(rightward[i - 1]);
-		const float below = down_by(downward[i]), below_up = down_by(-downward[i]);
-		const float above = down_by(-from_above[i]), above_up = down_by(from_above[i]);
+		const float right = down_by(rightward[k + 1]), right_up = down_by(-rightward[k + 1]);
+		const float left = down_by(-rightward[k]), left_up = down_by(rightward[k]);
+		const float below = down_by(downward[k]), below_up = down_by(-downward[k]);
+		const float above = down_by(-from_above[k]), above_up = down_by(from_above[k]);
 		const float high = limit - above, low = limit - below;
 		const struct smooth_masks behind = {
 			-(up->near[i] < high), -(down->near[i] < low), -(own->near[i - 1] < limit - left),
@@ -133,19 +184,17 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
 		const int32_t edges = -(2 * sides + corners), through = edges < MOST_BEHIND ? edges : MOST_BEHIND;
 		const float share = (float)(8 - through) * (1 / 64.0f);
 		const float rest = (float)through / (float)(8 * (edges ? edges : 1));
-		int32_t code[3];
 
 		for (int c = 0; c < 3; c++) {
 			const int32_t *a = up->light[c] + i, *o = own->light[c] + i, *b = down->light[c] + i;
 			const float front = (float)((4 + others) * o[0] + add_sides(a, o, b, &same));
 			const float back = (float)(2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind));
 
-			code[c] = (int32_t)(__builtin_sqrtf(front * share + back * rest) + 0.5f);
+			code[c][x + k] = smooth_code(front * share + back * rest);
 		}
-		pixel[i - MARGIN] = code[0] | code[1] << 8 | code[2] << 16;
 		n_edges += edges > 0;
 	}
-	return n_edges;
+	return (uint32_t)n_edges;
 }
 
 static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
@@ -153,36 +202,35 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	const uint32_t n = x1 - x0;
 	struct smooth_row rows[ROWS];
 	const struct smooth_row *row[ROWS];
-	struct smooth_steps steps;
-	int32_t pixel[SMOOTH_WIDTH];
+	int32_t code[3][SMOOTH_WIDTH];
 	uint32_t n_edges = 0;
 
-	for (uint32_t y = y0; y < y0 + ROWS - 1; y++)
-		load_smooth_row(&rows[y % ROWS], t, x0, n, (int64_t)y - MARGIN);
-	for (uint32_t y = y0; y < y1; y++) {
-		uint8_t *to = t->to + 3 * ((size_t)y * t->width + x0);
+	for (int64_t y = (int64_t)y0 - MARGIN; y < (int64_t)y1 + MARGIN; y++) {
+		const struct smooth_span in = smooth_span_of(t, x0, n, y), next = smooth_span_of(t, x0, n, y - MARGIN + 1);
+		const int64_t own = y - MARGIN;
 
-		load_smooth_row(&rows[(y + ROWS - 1) % ROWS], t, x0, n, (int64_t)y + MARGIN);
-		for (uint32_t k = 0; k < ROWS; k++)
-			row[k] = &rows[(y + k) % ROWS];
+		load_nearness(&rows[(y + MARGIN) % ROWS], t, &in);
+		if (own + 1 >= (int64_t)y0 - 1)
+			load_light(&rows[(own + 1 + MARGIN) % ROWS], t, &next);
+		if (own < (int64_t)y0)
+			continue;
+		for (int64_t k = 0; k < ROWS; k++)
+			row[k] = &rows[(own + k) % ROWS];
+		uint8_t *to = t->to + 3 * ((size_t)own * t->width + x0);
+
 		if (row[MARGIN]->is_empty) {
-			memcpy(to, t->from + 3 * ((size_t)y * t->width + x0), 3 * (size_t)n);
+			memcpy(to, t->from + 3 * ((size_t)own * t->width + x0), 3 * (size_t)n);
 			continue;
 		}
-		const struct smooth_row *own = row[MARGIN];
-		float *below = steps.vertical[y % 2], *above = steps.vertical[(y + 1) % 2];
-		const int is_first = y == y0 || row[MARGIN - 1]->is_empty;
-
-		smooth_falls(steps.right + 2, own->near, own->near + 2, own->near + 3, own->near + 5, n + 1);
-		smooth_falls(below + MARGIN, row[1]->near + MARGIN, own->near + MARGIN, row[4]->near + MARGIN,
-		             row[6]->near + MARGIN, n);
-		if (is_first)
-			smooth_falls(above + MARGIN, row[0]->near + MARGIN, row[2]->near + MARGIN, own->near + MARGIN,
-			             row[5]->near + MARGIN, n);
-		n_edges += smooth_pixels(pixel, row + MARGIN, steps.right, below, above, n);
-		for (uint32_t i = 0; i + 1 < n; i++) /* writes a byte of the next pixel, too */
-			memcpy(to + 3 * (size_t)i, &pixel[i], 4);
-		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
+		for (uint32_t x = 0; x < n; x += SMOOTH_RUN) {
+			if (is_smooth_surface(row + MARGIN, x + MARGIN))
+				smooth_inside(code, x, row + MARGIN);
+			else
+				n_edges += smooth_edges(code, x, row + MARGIN);
+		}
+		for (size_t i = 0; i < n; i++)
+			for (size_t c = 0; c < 3; c++)
+				to[3 * i + c] = (uint8_t)code[c][i];
 	}
 	return n_edges;
 }
