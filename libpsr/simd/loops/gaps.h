@@ -84,9 +84,11 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 	struct gaps_counts counts = { 0, 0, 0, 0 };
 
 	_Alignas(64) int32_t is_marked[GAPS_WIDTH] = { 0 }, n_partial[GAPS_WIDTH] = { 0 };
-	load_depths(&tile, t->stack, t->stack->levels ? GAPS_MARGIN : 1);
+	const int closed = t->method == PSR_GAPS_CLOSED ? closed_level(t, &tile) : 0;
 	const int by_cells = t->method == PSR_GAPS_CLOSED ? CLOSED_LEVELS + 1 : 1;
-	const int is_closed = t->method == PSR_GAPS_CLOSED && close_piece(limit, t, &tile);
+	load_depths(&tile, t->stack, closed ? 2 * (uint32_t)closed : 1);
+	if (closed)
+		close_piece(limit, t, &tile, closed);
 	for (int k = by_cells; k <= PSR_MAX_DEPTH_LEVEL && t->method != PSR_GAPS_OPAQUE; k++)
 		if (t->stack->levels >> k & 1)
 			begin_level(&level[k], k);
@@ -98,7 +100,7 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 		int is_less = 0;
 		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
 			weight[x] = GAPS_WHOLE;
-		if (is_closed)
+		if (closed)
 			is_less = cover_closed(weight, limit[y], z);
 		for (int k = by_cells; k <= PSR_MAX_DEPTH_LEVEL; k++)
 			if (t->stack->levels >> k & 1)

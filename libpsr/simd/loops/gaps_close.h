@@ -56,14 +56,30 @@ static int find_near_from(float *near, const struct gaps_target *t, const struct
 	return has_any;
 }
 
+/* Whether a sample of level k is near any pixel of the piece. */
 static int is_near_any(const struct gaps_target *t, const struct gaps_tile *tile, int k)
 {
-	float near[GAPS_WIDTH + 2 * SPREAD_RUN];
+	const size_t stride = t->stack->level[k].width, n = ((tile->width - 1) >> k) + 3;
+	const uint32_t first = tile->y0 >> k, end = ((tile->y0 + tile->height - 1) >> k) + 3;
+	float least = INFINITY;
 
-	for (uint32_t y = 0; y < tile->height; y += 1u << k)
-		if (find_near(near, t, tile, k, y))
-			return 1;
-	return 0;
+	for (uint32_t j = first; j < end; j++) {
+		const float *cell = t->stack->level[k].z + j * stride + (tile->x0 >> k);
+
+		for (size_t i = 0; i < n; i++)
+			least = cell[i] < least ? cell[i] : least;
+	}
+	return least < INFINITY;
+}
+
+/* The coarsest level to close that has samples near the piece, or 0. */
+static int closed_level(const struct gaps_target *t, const struct gaps_tile *tile)
+{
+	int k = CLOSED_LEVELS;
+
+	while (k > 0 && !(t->stack->levels >> k & 1 && is_near_any(t, tile, k)))
+		k--;
+	return k;
 }
 
 /* Of a row of the piece with its margin, the pixels that are in the picture: begin <= x < end. */
@@ -222,22 +238,16 @@ static inline __attribute__((always_inline)) void close_level(float (*limit)[GAP
 	}
 }
 
-/* Finds the depths beyond which a piece's pixels lie behind a surface. Returns 0 if nothing has gaps. */
-static int close_piece(float (*limit)[GAPS_WIDTH], const struct gaps_target *t, const struct gaps_tile *tile)
+/* Finds the depths beyond which a piece's pixels lie behind a surface of levels up to `coarsest`. */
+static void close_piece(float (*limit)[GAPS_WIDTH], const struct gaps_target *t, const struct gaps_tile *tile,
+                        int coarsest)
 {
-	int is_near[CLOSED_LEVELS + 1];
-
-	for (int k = 1; k <= CLOSED_LEVELS; k++)
-		is_near[k] = t->stack->levels >> k & 1 && is_near_any(t, tile, k);
-	if (!is_near[1] && !is_near[2])
-		return 0;
 	for (uint32_t y = 0; y < GAPS_BRICK; y++)
 		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
 			limit[y][x] = INFINITY;
 	close_level(limit, t, tile, 1, 1);
-	if (is_near[2])
+	if (coarsest == 2)
 		close_level(limit, t, tile, 2, 2);
-	return 1;
 }
 
 /* Takes the weight of a row's pixels beyond their limits. Returns whether there are any. */

@@ -18,7 +18,7 @@
  * columns. */
 struct gaps_tile {
 	_Alignas(64) float z[GAPS_ROWS][GAPS_STRIDE];
-	int32_t has_samples[GAPS_ROWS]; /* by row: in the piece, and a pixel on either side */
+	int32_t has_samples[GAPS_ROWS]; /* by row, with what of its margin was loaded: at least a pixel on each side */
 	uint32_t x0, y0, width, height;
 };
 
@@ -49,7 +49,7 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack, 
 			for (uint32_t x = 0; x < n; x++)
 				z[x] = psr_float_from_bits((uint32_t)(word[x] >> 32));
 		}
-		for (uint32_t x = GAPS_LEFT - 1; x < GAPS_LEFT + GAPS_WIDTH + 1; x++)
+		for (uint32_t x = 0; x < GAPS_STRIDE; x++)
 			has_samples |= row[x] < INFINITY;
 		tile->has_samples[i] = has_samples;
 	}
