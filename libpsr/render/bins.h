@@ -11,7 +11,7 @@ struct cull_hit {
 	uint16_t x0, x1, y0, y1;    /* pixels, inclusive, with the guard band */
 	uint16_t instance;
 	uint8_t level;
-	uint8_t is_mixed : 1, at_border : 1, is_wide : 1; /* as in bin_entry */
+	uint8_t is_mixed : 1, at_border : 1, is_wide : 1, is_sheer : 1, is_thin : 1; /* as in bin_entry */
 	uint8_t tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
 };
 

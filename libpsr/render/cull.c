@@ -3,8 +3,6 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include "ewa.h"
-#include "splat.h"
 
 /* Two passes over chunks of blocks: the first tests each block and counts entries by tile; the second writes the bins
  * at places that follow from the counts, in the same order for any number of threads. */
@@ -18,22 +16,6 @@ struct cull {
 	atomic_uint n_hits; /* that chunks have appended */
 };
 
-/* What is drawn is half a pixel along both axes; the square of a veil two pixels apart or more; the disc of a splat. */
-float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits, float apart,
-                       float depth_error)
-{
-	const float half = 0.70710678f;
-	float drawn = half;
-
-	if (plan->with_ewa && in->cull.cubes != NULL)
-		drawn = EWA_REACH * apart + EWA_REACH_PIXELS;
-	else if (plan->with_splats)
-		drawn = DISC_RADIUS * apart > half ? DISC_RADIUS * apart : half;
-	else if (traits & PSR_BLOCK_THIN && apart >= 2)
-		drawn = half * (apart + 1);
-	return drawn + (float)PSR_SAMPLE_OFF * apart + depth_error;
-}
-
 /* Takes the results of a batch, blocks first .. first + n - 1. */
 static void take_batch(struct cull_counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
 {
@@ -44,6 +26,7 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const int is_ewa = plan->with_ewa && in->cull.cubes != NULL; /* splats close gaps themselves */
+	const int has_opacity = b->opacity != NULL;
 	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
 
 	for (uint32_t i = 0; i < n; i++) {
@@ -51,6 +34,7 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 
 		if (!batch->is_left[i])
 			continue;
+		const unsigned traits = psr_blocks_traits(b, block);
 		if (masks != NULL && cull_by_mask(masks, b, block, (uint32_t)batch->range[i])) {
 			chunk->n_masked++;
 			continue;
@@ -65,6 +49,8 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 			.tile_x0 = (uint8_t)batch->tile_x0[i], .tile_x1 = (uint8_t)batch->tile_x1[i],
 			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
 		};
+		hit->is_sheer = has_opacity && traits & PSR_BLOCK_SHEER;
+		hit->is_thin = has_opacity && traits & PSR_BLOCK_THIN;
 		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats || is_ewa);
 		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
 		cull_count_tiles(to, hit);
@@ -72,10 +58,9 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 		chunk->n_mixed += hit->is_mixed;
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
-		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
+		chunk->traits |= (uint8_t)traits;
 		chunk->n_samples += cull_n_samples(in, block);
-		const float error = cull_place_error(plan, in, psr_blocks_traits(b, block), batch->apart[i],
-		                                     batch->depth_error[i]);
+		const float error = cull_place_error(plan, in, traits, batch->apart[i], batch->depth_error[i]);
 		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;
 	}
@@ -177,7 +162,8 @@ static void fill_chunk(int i, void *userdata)
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
 		const struct bin_entry entry = {
 			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed,
-			.at_border = hit->at_border, .is_wide = hit->is_wide, .hit = chunk->first_hit + h,
+			.at_border = hit->at_border, .is_wide = hit->is_wide, .is_sheer = hit->is_sheer,
+			.is_thin = hit->is_thin, .hit = chunk->first_hit + h,
 		};
 
 		if (h % CULL_BATCH == 0 && plan_is_cancelled(cull->plan))

@@ -3,6 +3,8 @@
 #define PSR_RENDER_CULL_H
 
 #include "bins.h"
+#include "ewa.h"
+#include "simd/discs.h"
 
 /* Fills the bins. Completes the plan: what shading needs for the blocks in view. MEMORY, LIMIT, CANCELLED. */
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
@@ -115,8 +117,20 @@ int cull_choose_levels(struct bins *bins, const struct plan *plan, struct psr_po
 
 /* How far what a block draws may be from the surface, in pixels: a sample from the surface, and what it draws from the
  * sample. apart, depth_error: as the kernel has them. */
-float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits, float apart,
-                       float depth_error);
+static inline float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits, float apart,
+                       float depth_error)
+{
+	const float half = 0.70710678f;
+	float drawn = half;
+
+	if (plan->with_ewa && in->cull.cubes != NULL)
+		drawn = EWA_REACH * apart + EWA_REACH_PIXELS;
+	else if (plan->with_splats)
+		drawn = DISC_RADIUS * apart > half ? DISC_RADIUS * apart : half;
+	else if (traits & PSR_BLOCK_THIN && apart >= 2)
+		drawn = half * (apart + 1);
+	return drawn + (float)PSR_SAMPLE_OFF * apart + depth_error;
+}
 
 /* Visibility masks of the screen's regions, for one instance ([G] 6.3): one mask for each of the 10 x 10 ranges of
  * regions that a block can lie in, in place of the smallest tree node that holds the block. */

@@ -12,6 +12,7 @@ int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
 	r->srgb = psr_srgb_of_16_bits();
+	sheer_init(&r->sheer);
 	*out = r;
 	return PSR_OK;
 }

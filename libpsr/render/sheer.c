@@ -40,12 +40,12 @@ int sheer_caster(float *opacity, const struct psr_blocks *b, uint32_t block)
 static int is_warped(const struct plan *plan, const struct bin_entry *entry)
 {
 	const struct plan_instance *in = &plan->instance[entry->instance];
-	const uint32_t block = entry->slot - in->first_slot;
 	float opacity;
 
-	if (!psr_blocks_is_sheer(in->cull.blocks, block))
+	if (!entry->is_sheer)
 		return plan->caster <= SHADOW_OPAQUE;
-	return plan->caster > SHADOW_OPAQUE && sheer_caster(&opacity, in->cull.blocks, block) == plan->caster;
+	return plan->caster > SHADOW_OPAQUE
+	       && sheer_caster(&opacity, in->cull.blocks, entry->slot - in->first_slot) == plan->caster;
 }
 
 uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile)
@@ -69,14 +69,16 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 	return end;
 }
 
-/* Finds the rows that the blocks reach. */
+/* Finds the rows and columns that the blocks reach. */
 static void find_area(struct sheer_area *area, const struct sheer_drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
 {
 	const struct plan *plan = d->plan;
 
-	area->x0 = tile % plan->tiles_x * TILE_WIDTH;
+	const uint32_t x0 = tile % plan->tiles_x * TILE_WIDTH;
+	const uint32_t end_x = plan->width - x0 < TILE_WIDTH ? plan->width : x0 + TILE_WIDTH;
+	uint32_t low_x = end_x, high_x = x0;
+
 	area->y0 = tile / plan->tiles_x * TILE_HEIGHT;
-	area->width = plan->width - area->x0 < TILE_WIDTH ? plan->width - area->x0 : TILE_WIDTH;
 	const uint32_t end_y = plan->height - area->y0 < TILE_HEIGHT ? plan->height : area->y0 + TILE_HEIGHT;
 	area->low_y = end_y;
 	area->high_y = area->y0;
@@ -85,7 +87,11 @@ static void find_area(struct sheer_area *area, const struct sheer_drawing *d, ui
 
 		area->low_y = hit->y0 < area->low_y ? hit->y0 : area->low_y;
 		area->high_y = hit->y1 >= area->high_y ? hit->y1 + 1u : area->high_y;
+		low_x = hit->x0 < low_x ? hit->x0 : low_x;
+		high_x = hit->x1 >= high_x ? hit->x1 + 1u : high_x;
 	}
+	area->x0 = low_x > x0 ? low_x : x0;
+	area->width = (high_x < end_x ? high_x : end_x) - area->x0;
 	area->low_y = area->low_y > area->y0 ? area->low_y : area->y0;
 	area->high_y = area->high_y < end_y ? area->high_y : end_y;
 }
@@ -93,6 +99,7 @@ static void find_area(struct sheer_area *area, const struct sheer_drawing *d, ui
 static void begin_tile(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
 	for (uint32_t y = area->low_y; y < area->high_y; y++) {
+		l->shown[y - area->y0] = (struct sheer_span){ area->width, 0 };
 		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
 
 		for (size_t at = sheer_place(area, y), x = 0; x < area->width; at++, x++) {
@@ -200,6 +207,7 @@ static uint64_t add_layer(struct sheer_tile *l, const struct sheer_drawing *d, c
 				__builtin_prefetch(psr_direction_table()[PSR_ATTR_NORMAL(l->strip.attr[i])]);
 			for (uint32_t i = 0; i < n_found; i++)
 				add_pixel(l, d->plan, first, i);
+			sheer_show(l, area, y, x, n_found);
 			*is_done = n_found == 0;
 			n_pixels += n_found;
 		}
@@ -226,8 +234,10 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct sheer_drawin
 	const struct sheer_picture *p = d->picture;
 	uint64_t n_pixels = 0;
 
-	for (uint32_t y = area->low_y; y < area->high_y; y++)
-		for (uint32_t x = 0; x < area->width; x++) {
+	for (uint32_t y = area->low_y; y < area->high_y; y++) {
+		const struct sheer_span shown = l->shown[y - area->y0];
+
+		for (uint32_t x = shown.begin; x < shown.end; x++) {
 			const size_t from = sheer_place(area, y) + x, to = (size_t)y * d->plan->width + area->x0 + x;
 
 			if (!(l->first[from] < INFINITY))
@@ -237,6 +247,7 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct sheer_drawin
 				p->depth[to] = l->first[from] * d->to_world[0] * d->to_world[1];
 			n_pixels++;
 		}
+	}
 	return n_pixels;
 }
 
@@ -299,10 +310,12 @@ static void draw_tile(struct sheer_drawing *d, uint32_t tile, struct sheer_tile 
 
 	if (begin == end)
 		return;
-	const uint32_t middle = thin_end(d->plan, d->bins, begin, end);
+	const uint32_t middle = thin_end(d->bins, begin, end);
 	const struct sheer_entries thin = { begin, middle }, glass = { middle, end };
 	find_area(&area, d, tile, begin, end);
 	warp_target_make(&target, d->plan, &stack, tile, l->word);
+	target.x0 = (int32_t)area.x0;
+	target.x1 = (int32_t)(area.x0 + area.width);
 	target.y0 = (int32_t)area.low_y;
 	target.y1 = (int32_t)area.high_y;
 	if (begin < middle) {
@@ -332,6 +345,12 @@ static void find_factors(float factor[2], int exponent)
 	factor[1] = psr_float_from_bits((uint32_t)(127 + clamped - clamped / 2) << 23);
 }
 
+void sheer_init(struct sheer *sheer)
+{
+	memset(sheer, 0, sizeof *sheer);
+	thin_tabulate(sheer->bits);
+}
+
 static int make_tiles(struct sheer *sheer, int n)
 {
 	struct sheer_tile *tile = realloc(sheer->tile, (size_t)n * sizeof *tile);
@@ -353,8 +372,6 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 
 	if (n_slots > sheer->n_tiles && make_tiles(sheer, n_slots))
 		return PSR_ERR_MEMORY;
-	if (plan->has_thin)
-		thin_tabulate(d.bits);
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
 	const int rc = psr_pool_for_until(pool, &plan->cancel, (int)(plan->tiles_x * plan->tiles_y), draw_one, &d);

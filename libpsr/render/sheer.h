@@ -17,8 +17,11 @@ struct sheer {
 	struct slots slots;
 	float *depth;
 	size_t depth_size;
+	float bits[PSR_OPAQUE + 1]; /* of thin things, see thin_tabulate() */
 	struct sheer_counts thin, glass; /* of the last picture */
 };
+
+void sheer_init(struct sheer *sheer);
 
 #define SHEER_MOST 64 /* words of a pixel: eight layers of eight samples, so that a crowd of panes costs no more */
 

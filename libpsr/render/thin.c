@@ -17,13 +17,12 @@
 #define RUN 256
 #define RUN_PIXELS 4096
 
-uint32_t thin_end(const struct plan *plan, const struct bins *bins, uint32_t begin, uint32_t end)
+uint32_t thin_end(const struct bins *bins, uint32_t begin, uint32_t end)
 {
 	while (begin < end) {
 		const struct bin_entry entry = bins->entry[begin];
-		const struct plan_instance *in = &plan->instance[entry.instance];
 
-		if (psr_blocks_traits(in->cull.blocks, entry.slot - in->first_slot) & PSR_BLOCK_THIN) {
+		if (entry.is_thin) {
 			begin++;
 			continue;
 		}
@@ -98,6 +97,7 @@ static void light_strip(struct sheer_tile *l, const struct sheer_drawing *d, con
 	l->pixels.x0 = area->x0 + x;
 	l->pixels.y = y;
 	const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, n, &l->pixels, &l->strip);
+	sheer_show(l, area, y, x, n_found);
 	for (uint32_t i = 0; i < n_found; i++) {
 		const size_t at = first + l->pixels.x[i];
 		const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
@@ -139,7 +139,7 @@ void thin_draw(struct sheer_tile *l, const struct sheer_drawing *d, const struct
                const struct warp_target *target, const struct sheer_entries *entries)
 {
 	const size_t first = sheer_place(area, area->low_y);
-	const struct veil_layer layer = { l->before + first, l->word + first, l->veil + first, d->bits };
+	const struct veil_layer layer = { l->before + first, l->word + first, l->veil + first, d->sheer->bits };
 
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (size_t at = sheer_place(area, y), x = 0; x < area->width; at++, x++) {

@@ -8,7 +8,7 @@
 void thin_tabulate(float bits[PSR_OPAQUE + 1]);
 
 /* Moves glass behind thin things in entries of a tile. Returns the first one of glass. */
-uint32_t thin_end(const struct plan *plan, const struct bins *bins, uint32_t begin, uint32_t end);
+uint32_t thin_end(const struct bins *bins, uint32_t begin, uint32_t end);
 
 /* Finds the light of the thin things in a tile that shows no layer yet. The nearest lends its colour to all behind
  * it. */
