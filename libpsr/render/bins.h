@@ -4,6 +4,10 @@
 
 #include "plan.h"
 
+/* What draws a block: the warp, or what adds sheer surfaces, thin ones first. A shadow map of glass warps the blocks of
+ * its class, and leaves all others to BIN_GLASS, which nothing draws. */
+enum bin_kind { BIN_WARPED, BIN_THIN, BIN_GLASS, BIN_KINDS };
+
 /* A block in view, and where it may show. */
 struct cull_hit {
 	uint32_t slot;
@@ -11,16 +15,19 @@ struct cull_hit {
 	uint16_t x0, x1, y0, y1;    /* pixels, inclusive, with the guard band */
 	uint16_t instance;
 	uint8_t level;
-	uint8_t is_mixed : 1, at_border : 1, is_wide : 1, is_sheer : 1, is_thin : 1; /* as in bin_entry */
+	uint8_t is_mixed : 1, at_border : 1, is_wide : 1; /* as in bin_entry */
+	uint8_t kind : 2; /* enum bin_kind */
 	uint8_t tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
 };
 
 /* Capacities are in bytes. */
 struct bins {
-	struct bin_entry *entry; /* by tile */
+	struct bin_entry *entry; /* by tile and kind */
 	size_t entry_capacity;
 	uint32_t *tile_begin;    /* n_tiles + 1 */
 	size_t tile_begin_capacity;
+	uint32_t *thin_begin, *glass_begin; /* by tile: where its entries of these kinds begin */
+	size_t thin_begin_capacity, glass_begin_capacity;
 	uint64_t *by_work;       /* tiles, in the lower halves, most entries first: threads wait for the last ones */
 	size_t by_work_capacity;
 	uint8_t *is_quiet;       /* as plan.is_quiet */
@@ -38,7 +45,7 @@ struct bins {
 	size_t masks_capacity;
 	struct cull_group *group; /* of all instances */
 	size_t group_capacity;
-	uint32_t *count;          /* chunk by tile */
+	uint32_t *count;          /* chunk by tile and kind */
 	size_t count_capacity;
 };
 

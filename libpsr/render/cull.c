@@ -3,6 +3,8 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include "sheer.h"
+#include "shadow.h"
 
 /* Two passes over chunks of blocks: the first tests each block and counts entries by tile; the second writes the bins
  * at places that follow from the counts, in the same order for any number of threads. */
@@ -16,6 +18,17 @@ struct cull {
 	atomic_uint n_hits; /* that chunks have appended */
 };
 
+static enum bin_kind kind_of(const struct plan *plan, const struct psr_blocks *b, uint32_t block, unsigned traits)
+{
+	float opacity;
+
+	if (b->opacity == NULL || !(traits & PSR_BLOCK_SHEER))
+		return plan->caster <= SHADOW_OPAQUE ? BIN_WARPED : BIN_GLASS;
+	if (plan->caster > SHADOW_OPAQUE)
+		return sheer_caster(&opacity, b, block) == plan->caster ? BIN_WARPED : BIN_GLASS;
+	return traits & PSR_BLOCK_THIN ? BIN_THIN : BIN_GLASS;
+}
+
 /* Takes the results of a batch, blocks first .. first + n - 1. */
 static void take_batch(struct cull_counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
 {
@@ -26,7 +39,6 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const int is_ewa = plan->with_ewa && in->cull.cubes != NULL; /* splats close gaps themselves */
-	const int has_opacity = b->opacity != NULL;
 	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
 
 	for (uint32_t i = 0; i < n; i++) {
@@ -49,8 +61,7 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 			.tile_x0 = (uint8_t)batch->tile_x0[i], .tile_x1 = (uint8_t)batch->tile_x1[i],
 			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
 		};
-		hit->is_sheer = has_opacity && traits & PSR_BLOCK_SHEER;
-		hit->is_thin = has_opacity && traits & PSR_BLOCK_THIN;
+		hit->kind = kind_of(plan, b, block, traits) & 3;
 		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats || is_ewa);
 		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
 		cull_count_tiles(to, hit);
@@ -110,7 +121,7 @@ static void count_chunk(int i, void *userdata)
 	uint64_t cubes[CULL_MOST_CHUNK];
 	struct cull_counting to = { cull->bins, cull->simd, plan, &chunk, count, hit, plan->with_runs ? cubes : NULL };
 
-	memset(count, 0, cull->n_tiles * sizeof *count);
+	memset(count, 0, cull->n_tiles * BIN_KINDS * sizeof *count);
 	if (in->cull.cubes != NULL && plan->with_runs)
 		cull_count_runs(&to);
 	else
@@ -162,8 +173,7 @@ static void fill_chunk(int i, void *userdata)
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
 		const struct bin_entry entry = {
 			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed,
-			.at_border = hit->at_border, .is_wide = hit->is_wide, .is_sheer = hit->is_sheer,
-			.is_thin = hit->is_thin, .hit = chunk->first_hit + h,
+			.at_border = hit->at_border, .is_wide = hit->is_wide, .hit = chunk->first_hit + h,
 		};
 
 		if (h % CULL_BATCH == 0 && plan_is_cancelled(cull->plan))
@@ -171,7 +181,7 @@ static void fill_chunk(int i, void *userdata)
 		mark_parts(cull->bins->is_quiet, cull->plan, hit);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
-				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;
+				cull->bins->entry[next[(y * cull->plan->tiles_x + x) * BIN_KINDS + hit->kind]++] = entry;
 	}
 }
 
@@ -188,16 +198,19 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	uint64_t total = 0;
 
 	for (uint32_t t = 0; t < cull->n_tiles; t++) {
+		uint32_t *const begins[BIN_KINDS] = { &bins->tile_begin[t], &bins->thin_begin[t], &bins->glass_begin[t] };
 		const uint64_t begin = total;
 
-		bins->tile_begin[t] = (uint32_t)total;
-		for (uint32_t i = 0; i < cull->n_chunks; i++) {
-			uint32_t *count = &bins->count[(size_t)i * cull->stride + t], n = *count;
+		for (uint32_t kind = 0; kind < BIN_KINDS; kind++) {
+			*begins[kind] = (uint32_t)total;
+			for (uint32_t i = 0; i < cull->n_chunks; i++) {
+				uint32_t *count = &bins->count[(size_t)i * cull->stride + t * BIN_KINDS + kind], n = *count;
 
-			if (plan_is_cancelled_at(cull->plan, i))
-				return PSR_ERR_CANCELLED;
-			*count = (uint32_t)total;
-			total += n;
+				if (plan_is_cancelled_at(cull->plan, i))
+					return PSR_ERR_CANCELLED;
+				*count = (uint32_t)total;
+				total += n;
+			}
 		}
 		if (total > UINT32_MAX)
 			return PSR_ERR_LIMIT;
@@ -233,7 +246,9 @@ static int make_room(struct bins *bins, const struct cull *cull)
 
 	return bins_room(bins, hit, plan->n_slots) && (!plan->with_runs || bins_room(bins, cubes, plan->n_slots))
 	               && bins_room(bins, count, (size_t)cull->n_chunks * cull->stride)
-	               && bins_room(bins, tile_begin, cull->n_tiles + 1) && bins_room(bins, by_work, cull->n_tiles)
+	               && bins_room(bins, tile_begin, cull->n_tiles + 1)
+	               && bins_room(bins, thin_begin, cull->n_tiles) && bins_room(bins, glass_begin, cull->n_tiles)
+	               && bins_room(bins, by_work, cull->n_tiles)
 	               && bins_room(bins, is_quiet, plan->parts_x * plan->parts_y)
 	               && bins_room(bins, masks, plan->n_instances)
 	           ? PSR_OK
@@ -302,7 +317,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
                 struct psr_report *report)
 {
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
-	const uint32_t stride = (n_tiles + line - 1) / line * line;
+	const uint32_t stride = (n_tiles * BIN_KINDS + line - 1) / line * line;
 	struct cull cull = { bins, simd, plan, 0, n_tiles, stride, 0 };
 	int rc = bins_room(bins, group, plan->n_groups) ? PSR_OK : PSR_ERR_MEMORY;
 

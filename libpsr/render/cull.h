@@ -39,7 +39,7 @@ static inline void cull_count_tiles(const struct cull_counting *to, const struct
 {
 	for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 		for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
-			to->count[y * to->plan->tiles_x + x]++;
+			to->count[(y * to->plan->tiles_x + x) * BIN_KINDS + hit->kind]++;
 }
 
 /* Tests the cubes of a chunk, by runs. */

@@ -54,6 +54,7 @@ static void put_hit(struct cull_counting *to, const struct alike *alike, uint32_
 	*hit = (struct cull_hit){
 		.slot = plan->instance[to->chunk->instance].first_slot + first, .instance = (uint16_t)to->chunk->instance,
 		.near = alike->near, .level = (uint8_t)level, .is_mixed = is_mixed & 1, .is_wide = level > 0,
+		.kind = plan->caster <= SHADOW_OPAQUE ? BIN_WARPED : BIN_GLASS,
 		.x0 = (uint16_t)alike->x[0], .x1 = (uint16_t)alike->x[1],
 		.y0 = (uint16_t)alike->y[0], .y1 = (uint16_t)alike->y[1],
 		.tile_x0 = (uint8_t)alike->tiles, .tile_x1 = (uint8_t)(alike->tiles >> 8),

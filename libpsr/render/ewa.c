@@ -56,7 +56,7 @@ static float same_of(const struct plan *plan, const struct bin_entry *entry)
 void ewa_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, const struct warp_into *into,
               uint32_t tile)
 {
-	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
+	const uint32_t begin = bins->tile_begin[tile], end = bins->thin_begin[tile];
 	const int skips = (plan->cull_tests & PSR_CULL_OCCLUSION) != 0;
 	struct bin_entry some[RUN];
 	struct warp_target target;

@@ -36,39 +36,6 @@ int sheer_caster(float *opacity, const struct psr_blocks *b, uint32_t block)
 	return *opacity <= 0.25f ? 1 : *opacity <= 0.5f ? 2 : *opacity <= 0.75f ? 3 : 4;
 }
 
-/* Whether the warp draws a block: opaque ones, or in a shadow map of glass the sheer ones of its class. */
-static int is_warped(const struct plan *plan, const struct bin_entry *entry)
-{
-	const struct plan_instance *in = &plan->instance[entry->instance];
-	float opacity;
-
-	if (!entry->is_sheer)
-		return plan->caster <= SHADOW_OPAQUE;
-	return plan->caster > SHADOW_OPAQUE
-	       && sheer_caster(&opacity, in->cull.blocks, entry->slot - in->first_slot) == plan->caster;
-}
-
-uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile)
-{
-	uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
-
-	if (!plan->has_sheer)
-		return plan->caster <= SHADOW_OPAQUE ? end : begin;
-	while (begin < end) {
-		const struct bin_entry entry = bins->entry[begin];
-
-		if (plan_is_cancelled_at(plan, end - begin))
-			break;
-		if (is_warped(plan, &entry)) {
-			begin++;
-			continue;
-		}
-		bins->entry[begin] = bins->entry[--end];
-		bins->entry[end] = entry;
-	}
-	return end;
-}
-
 /* Finds the rows and columns that the blocks reach. */
 static void find_area(struct sheer_area *area, const struct sheer_drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
 {
@@ -303,14 +270,14 @@ static void draw_glass(struct sheer_tile *l, struct sheer_drawing *d, const stru
 
 static void draw_tile(struct sheer_drawing *d, uint32_t tile, struct sheer_tile *l)
 {
-	const uint32_t begin = sheer_begin(d->plan, d->bins, tile), end = d->bins->tile_begin[tile + 1];
+	const struct bins *bins = d->bins;
+	const uint32_t begin = bins->thin_begin[tile], middle = bins->glass_begin[tile], end = bins->tile_begin[tile + 1];
 	const struct psr_zstack stack = { .levels = 0 };
 	struct warp_target target;
 	struct sheer_area area;
 
 	if (begin == end)
 		return;
-	const uint32_t middle = thin_end(d->bins, begin, end);
 	const struct sheer_entries thin = { begin, middle }, glass = { middle, end };
 	find_area(&area, d, tile, begin, end);
 	warp_target_make(&target, d->plan, &stack, tile, l->word);

@@ -64,10 +64,6 @@ static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word
 /* Finds the mean opacity of a sheer block, 0..1. Returns the class of its shadow. */
 int sheer_caster(float *opacity, const struct psr_blocks *blocks, uint32_t block);
 
-/* Moves the entries of a tile that the warp leaves out behind the others, and returns the first of them: of a picture
- * the sheer ones, of a shadow map all that another map has. */
-uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile);
-
 /* Lists the words of blocks in a tile. Samples at most a pixel apart are pixels if the picture has no splats; all
  * others are discs. */
 void sheer_list_blocks(struct sheer_list *list, const struct simd *simd, const struct plan *plan,

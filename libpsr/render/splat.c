@@ -186,7 +186,7 @@ _Static_assert(TILE_WIDTH % 8 == 0, "a byte of offcuts is in one tile");
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               const struct splat_into *into, uint32_t tile)
 {
-	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
+	const uint32_t begin = bins->tile_begin[tile], end = bins->thin_begin[tile];
 	struct warp_counts counts = { 0, 0, 0 };
 	struct warp_target target;
 

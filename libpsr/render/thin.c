@@ -17,21 +17,6 @@
 #define RUN 256
 #define RUN_PIXELS 4096
 
-uint32_t thin_end(const struct bins *bins, uint32_t begin, uint32_t end)
-{
-	while (begin < end) {
-		const struct bin_entry entry = bins->entry[begin];
-
-		if (entry.is_thin) {
-			begin++;
-			continue;
-		}
-		bins->entry[begin] = bins->entry[--end];
-		bins->entry[end] = entry;
-	}
-	return end;
-}
-
 /* Returns how many times 1 is halved to give x, 0 < x <= 1, to 2^-20. */
 static double halvings(double x)
 {

@@ -7,9 +7,6 @@
 /* Finds the veil of each opacity, see simd/veil.h. */
 void thin_tabulate(float bits[PSR_OPAQUE + 1]);
 
-/* Moves glass behind thin things in entries of a tile. Returns the first one of glass. */
-uint32_t thin_end(const struct bins *bins, uint32_t begin, uint32_t end);
-
 /* Finds the light of the thin things in a tile that shows no layer yet. The nearest lends its colour to all behind
  * it. */
 void thin_draw(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area,

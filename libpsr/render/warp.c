@@ -118,10 +118,13 @@ int warp_looks(const struct plan *plan, uint32_t n)
 
 /* As how many blocks, groups of points or cubes of a surface a tile's entries are: a cube of a surface has sixteen
  * leaves in the mean, one of a sparse cloud a few. */
-static uint32_t n_blocks_of(const struct warp_target *t, const struct bin_entry *entry, uint32_t n_entries)
+static uint32_t n_blocks_of(const struct plan *plan, const struct warp_target *t, const struct bin_entry *entry, uint32_t n_entries)
 {
 	const struct psr_blocks *last = NULL;
 	float n = 0, share = 1;
+
+	if (!plan->has_octrees)
+		return n_entries;
 
 	for (uint32_t e = 0; e < n_entries; e++) {
 		const struct warp_instance *in = &t->instance[entry[e].instance];
@@ -139,7 +142,7 @@ static uint32_t n_blocks_of(const struct warp_target *t, const struct bin_entry 
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile)
 {
-	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
+	const uint32_t begin = bins->tile_begin[tile], end = bins->thin_begin[tile];
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
 
@@ -147,7 +150,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	target.clean = into->clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
 	target.cubes = plan->with_runs ? bins->cubes : NULL;
-	if (warp_looks(plan, n_blocks_of(&target, bins->entry + begin, end - begin))) {
+	if (warp_looks(plan, n_blocks_of(plan, &target, bins->entry + begin, end - begin))) {
 		simd->warp_clear(&target, into->stack->levels);
 		counts = warp_near_to_far(simd, plan, bins, &target, begin, end);
 	} else {

@@ -79,7 +79,6 @@ struct bin_entry {
 	uint8_t is_mixed : 1;  /* some of its samples may face away */
 	uint8_t at_border : 1; /* it may reach beyond the picture */
 	uint8_t is_wide : 1;   /* a cube's leaves: wider than pixels, so that their offsets count */
-	uint8_t is_sheer : 1, is_thin : 1; /* a block's traits */
 	uint32_t hit;          /* index in bins->hit */
 };
 
