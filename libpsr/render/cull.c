@@ -39,7 +39,7 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const int is_ewa = plan->with_ewa && in->cull.cubes != NULL; /* splats close gaps themselves */
-	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
+	const int32_t most_x = (int32_t)plan->width - 1, most_y = (int32_t)plan->height - 1;
 
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t block = first + i;
@@ -53,17 +53,18 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 		}
 		const int is_clamped = !is_ewa && batch->level[i] > PSR_MAX_DEPTH_LEVEL;
 		const int level = is_clamped ? PSR_MAX_DEPTH_LEVEL : is_ewa ? 0 : batch->level[i];
+		const int at_border = (batch->x0[i] == 0) | (batch->y0[i] == 0) | (batch->x1[i] == most_x)
+		                      | (batch->y1[i] == most_y);
 		*hit = (struct cull_hit){
 			.slot = in->first_slot + block, .instance = (uint16_t)chunk->instance, .near = batch->near[i],
-			.level = (uint8_t)level, .is_mixed = batch->is_mixed[i] & 1,
+			.level = (uint8_t)level, .is_mixed = batch->is_mixed[i] & 1, .at_border = at_border & 1,
+			.is_wide = in->cull.cubes != NULL && (level > 0 || plan->with_splats || is_ewa),
+			.kind = kind_of(plan, b, block, traits) & 3,
 			.x0 = (uint16_t)batch->x0[i], .x1 = (uint16_t)batch->x1[i],
 			.y0 = (uint16_t)batch->y0[i], .y1 = (uint16_t)batch->y1[i],
 			.tile_x0 = (uint8_t)batch->tile_x0[i], .tile_x1 = (uint8_t)batch->tile_x1[i],
 			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
 		};
-		hit->kind = kind_of(plan, b, block, traits) & 3;
-		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats || is_ewa);
-		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
 		cull_count_tiles(to, hit);
 		chunk->levels |= 1u << hit->level;
 		chunk->n_mixed += hit->is_mixed;

@@ -37,9 +37,16 @@ struct cull_counting {
 
 static inline void cull_count_tiles(const struct cull_counting *to, const struct cull_hit *hit)
 {
-	for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
-		for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
-			to->count[(y * to->plan->tiles_x + x) * BIN_KINDS + hit->kind]++;
+	const uint32_t stride = to->plan->tiles_x * BIN_KINDS, wide = (uint32_t)(hit->tile_x1 - hit->tile_x0) * BIN_KINDS;
+	uint32_t *count = to->count + hit->tile_y0 * stride + hit->tile_x0 * BIN_KINDS + hit->kind;
+
+	if (hit->tile_x0 == hit->tile_x1 && hit->tile_y0 == hit->tile_y1) { /* most often */
+		count[0]++;
+		return;
+	}
+	for (const uint32_t *end = count + (hit->tile_y1 - hit->tile_y0) * stride; count <= end; count += stride)
+		for (uint32_t x = 0; x <= wide; x += BIN_KINDS)
+			count[x]++;
 }
 
 /* Tests the cubes of a chunk, by runs. */
