@@ -7,8 +7,11 @@
 #define ARRAY(name) { offsetof(struct bins, name), offsetof(struct bins, name##_capacity) }
 static const struct {
 	size_t array, capacity;
-} arrays[] = { ARRAY(entry), ARRAY(tile_begin), ARRAY(thin_begin), ARRAY(glass_begin), ARRAY(by_work), ARRAY(is_quiet), ARRAY(hit),  ARRAY(cubes),
-	           ARRAY(order), ARRAY(chunk),      ARRAY(masks),   ARRAY(group),    ARRAY(count) };
+} arrays[] = {
+	ARRAY(entry), ARRAY(tile_begin), ARRAY(thin_begin), ARRAY(glass_begin), ARRAY(by_work), ARRAY(is_quiet),
+	ARRAY(hit),   ARRAY(cubes),      ARRAY(order),      ARRAY(chunk),       ARRAY(masks),   ARRAY(group),
+	ARRAY(count),
+};
 #define N_ARRAYS (sizeof arrays / sizeof *arrays)
 
 static size_t capacity_of(const struct bins *bins, size_t i)

@@ -124,8 +124,8 @@ int cull_choose_levels(struct bins *bins, const struct plan *plan, struct psr_po
 
 /* How far what a block draws may be from the surface, in pixels: a sample from the surface, and what it draws from the
  * sample. apart, depth_error: as the kernel has them. */
-static inline float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits, float apart,
-                       float depth_error)
+static inline float cull_place_error(const struct plan *plan, const struct plan_instance *in, unsigned traits,
+                                     float apart, float depth_error)
 {
 	const float half = 0.70710678f;
 	float drawn = half;

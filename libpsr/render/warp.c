@@ -118,7 +118,8 @@ int warp_looks(const struct plan *plan, uint32_t n)
 
 /* As how many blocks, groups of points or cubes of a surface a tile's entries are: a cube of a surface has sixteen
  * leaves in the mean, one of a sparse cloud a few. */
-static uint32_t n_blocks_of(const struct plan *plan, const struct warp_target *t, const struct bin_entry *entry, uint32_t n_entries)
+static uint32_t n_blocks_of(const struct plan *plan, const struct warp_target *t, const struct bin_entry *entry,
+                            uint32_t n_entries)
 {
 	const struct psr_blocks *last = NULL;
 	float n = 0, share = 1;

@@ -8,7 +8,7 @@
 
 #define MARGIN SMOOTH_REACH
 #define ROWS (2 * MARGIN + 1)
-#define SMOOTH_RUN 16 /* pixels together; _Static_assert below */
+#define SMOOTH_RUN 16 /* pixels together: the fewer, the more runs are of one surface */
 
 /* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane:
  * 1 / z' in perspective, else -z'. NaN outside of the picture: every comparison fails. */
@@ -31,7 +31,9 @@ static struct smooth_span smooth_span_of(const struct smooth_target *t, uint32_t
 	const size_t first = x0 < MARGIN ? MARGIN - x0 : 0, left = t->width - x0, all = n + 2 * MARGIN;
 	const size_t end = left + MARGIN < all ? left + MARGIN : all;
 
-	return (struct smooth_span){ first, is_inside ? end : first, (ptrdiff_t)(is_inside ? y : 0) * t->width + x0 - MARGIN };
+	const ptrdiff_t row = (ptrdiff_t)(is_inside ? y : 0) * t->width;
+
+	return (struct smooth_span){ first, is_inside ? end : first, row + x0 - MARGIN };
 }
 
 static void load_nearness(struct smooth_row *row, const struct smooth_target *t, const struct smooth_span *in)
@@ -109,14 +111,16 @@ static inline int32_t is_smooth_surface(const struct smooth_row *const *row, siz
 	return is_one;
 }
 
-static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row)
+static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
+                                 const struct smooth_row *const *row)
 {
 	for (int c = 0; c < 3; c++) {
 		const int32_t *a = row[-1]->light[c] + MARGIN + x, *o = row[0]->light[c] + MARGIN + x;
 		const int32_t *b = row[1]->light[c] + MARGIN + x;
 
 		for (ptrdiff_t i = 0; i < SMOOTH_RUN; i++)
-			code[c][x + (size_t)i] = smooth_code((float)(4 * o[i] + ((a[i] + b[i]) + (o[i - 1] + o[i + 1]))) * (1 / 8.0f));
+			code[c][x + (size_t)i] =
+				smooth_code((float)(4 * o[i] + ((a[i] + b[i]) + (o[i - 1] + o[i + 1]))) * (1 / 8.0f));
 	}
 }
 
@@ -146,7 +150,8 @@ static inline int32_t is_same(float fall, float rise, float near, float limit, f
 }
 
 /* Returns how many pixels have a neighbour behind. */
-static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row)
+static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
+                                    const struct smooth_row *const *row)
 {
 	const size_t first = x + MARGIN;
 	const struct smooth_row *up = row[-1], *own = row[0], *down = row[1];
