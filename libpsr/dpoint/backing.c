@@ -1,6 +1,7 @@
 #include "backing.h"
 
 #include <math.h>
+#include "sight.h"
 
 /* Whether a convex quadrilateral holds the place u, v. */
 static int is_in(const float corner[4][3], float u, float v)
@@ -21,18 +22,16 @@ static int is_in(const float corner[4][3], float u, float v)
 struct standing {
 	const struct looking *l;
 	const struct rectangle *r;
-	float at[3];
+	struct sight_frame frame;
+	lanes at, near; /* how much further along u, v and the normal it may be; lane 3: any */
 };
 
 static int may_back(const struct standing *s, size_t i)
 {
 	const struct cell_ball *ball = &s->l->tree->ball[i];
-	float p[3];
+	const lanes p = sight_turned(s->frame.axis, sight_middle(ball) - s->frame.at);
 
-	rectangle_sees(p, s->r, ball->middle);
-	return fabsf(p[0] - s->at[0]) <= rectangle_reach(s->r, 0, ball) &&
-	       fabsf(p[1] - s->at[1]) <= rectangle_reach(s->r, 1, ball) &&
-	       fabsf(p[2] - s->at[2]) <= rectangle_reach(s->r, 2, ball) + 2 * s->r->height;
+	return !lanes_any(~(lanes_size(p - s->at) <= sight_turned(s->frame.slant, sight_half(ball)) + s->near));
 }
 
 static int leaf_backs(const struct standing *s, size_t i)
@@ -85,9 +84,12 @@ static size_t find_backing(const struct standing *s, size_t last)
 
 int is_backed(size_t *last, const struct looking *l, const struct rectangle *r, float u, float v)
 {
-	const struct standing s = { l, r, { u, v, dpoint_height_at(r->lambda_u, r->rho, u, v) } };
-	const size_t found = find_backing(&s, *last);
+	struct standing s = { .l = l, .r = r, .at = { u, v, dpoint_height_at(r->lambda_u, r->rho, u, v), 0 },
+		                  .near = { 0, 0, 2 * r->height, INFINITY } };
+	size_t found;
 
+	sight_frame_of(&s.frame, r);
+	found = find_backing(&s, *last);
 	if (found > 0)
 		*last = found;
 	return found > 0;

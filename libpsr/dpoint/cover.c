@@ -5,6 +5,7 @@
 #include "base/array.h"
 #include "base/vec.h"
 #include "rectangle.h"
+#include "sight.h"
 
 #define CHUNK 256 /* candidates */
 
@@ -22,25 +23,32 @@ struct found {
 	int is_failed;
 };
 
-/* The covered nodes of a subtree. */
-static void search(struct found *found, const struct looking *l, const struct rectangle *r, size_t i)
-{
-	const struct cell_ball *ball = &l->tree->ball[i];
-	const struct cell_node *node = &l->tree->node[i];
-	float p[3];
-	int is_leaf;
+/* A rectangle, and what cells are within: lane 3 is anything. */
+struct within {
+	const struct looking *look;
+	const struct rectangle *rectangle;
+	struct sight_frame frame;
+	lanes limit;
+};
 
-	rectangle_sees(p, r, ball->middle);
-	if (!(fabsf(p[0]) <= r->extent[0] + rectangle_reach(r, 0, ball) &&
-	      fabsf(p[1]) <= r->extent[1] + rectangle_reach(r, 1, ball) &&
-	      fabsf(p[2]) <= r->deep + rectangle_reach(r, 2, ball)))
+/* The covered nodes of a subtree, of cells begin..end of the tree's order. */
+static void search(struct found *found, const struct within *w, size_t i, uint32_t begin, uint32_t end)
+{
+	const struct looking *l = w->look;
+	const struct cell_ball *ball = &l->tree->ball[i];
+	const lanes seen = sight_turned(w->frame.axis, sight_middle(ball) - w->frame.at);
+	const uint32_t half = begin + (end - begin) / 2;
+	const int is_leaf = end - begin == 1;
+	float p[3];
+
+	if (lanes_any(~(lanes_size(seen) <= w->limit + sight_turned(w->frame.slant, sight_half(ball)))))
 		return;
-	is_leaf = cell_node_is_leaf(node);
-	if (is_leaf && !rectangle_covers(l, r, &l->surface->cell[l->tree->order[node->begin]]))
+	memcpy(p, &seen, sizeof p);
+	if (is_leaf && !rectangle_covers(l, w->rectangle, &l->surface->cell[l->tree->order[begin]]))
 		return;
-	if (!is_leaf && !rectangle_covers_node(l, r, i, p)) {
-		search(found, l, r, 2 * i + 1);
-		search(found, l, r, 2 * i + 2);
+	if (!is_leaf && !rectangle_covers_node(l, w->rectangle, i, p)) {
+		search(found, w, 2 * i + 1, begin, half);
+		search(found, w, 2 * i + 2, half, end);
 		return;
 	}
 	if (!ARRAY_ROOM(found->node, found->n, found->room)) {
@@ -48,6 +56,14 @@ static void search(struct found *found, const struct looking *l, const struct re
 		return;
 	}
 	found->node[found->n++] = (uint32_t)i;
+}
+
+static void search_all(struct found *found, const struct looking *l, const struct rectangle *r)
+{
+	struct within w = { .look = l, .rectangle = r, .limit = { r->extent[0], r->extent[1], r->deep, INFINITY } };
+
+	sight_frame_of(&w.frame, r);
+	search(found, &w, 0, l->tree->node[0].begin, l->tree->node[0].end);
 }
 
 size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate)
@@ -88,7 +104,7 @@ static void look(int chunk, void *userdata)
 			keep_margin(&r, &l->surface->candidate[i], l->options);
 		rectangle_shorten(&r, l->options->slack);
 		if (r.extent[0] > 0 && r.extent[1] > 0)
-			search(&found, l, &r, 0);
+			search_all(&found, l, &r);
 		cover->n[i] = (uint32_t)(found.n - before);
 	}
 	cover->chunk[covering->first_chunk + (size_t)chunk] = found.node;

@@ -7,6 +7,7 @@
 #include "base/vec.h"
 #include "bound.h"
 #include "rectangle.h"
+#include "sight.h"
 
 #define CHUNK 256    /* candidates */
 #define FIRST 0.125f /* of an extent: where growing begins */
@@ -18,11 +19,13 @@
 /* What a thread looks with. */
 struct search {
 	struct bars bars;
-	float box[3], per_widest[3]; /* where what may end the rectangle is, along x, y and z from its place, and how much
-	                              * further for each unit of a cell's radius */
+	struct sight_frame frame;
+	lanes box, per_widest; /* where what may end the rectangle is, along x, y and z from its place, and how much further
+	                        * for each unit of a cell's radius; lane 3 of this and the next two is anywhere */
+	lanes limit;           /* along u, v and the normal */
+	lanes free_one;        /* half-sides of a rectangle that is known to have none */
 	float over[2];  /* how far the rectangle may reach over what ends it: the overhang, or half of a narrow one, which
 	                 * nothing would end otherwise */
-	float free[2];  /* half-sides of a rectangle that is known to have none */
 	int left;       /* how many nodes may still be looked at; below 0: there may be more bars */
 	size_t backing; /* is_backed() */
 };
@@ -103,72 +106,92 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 
 /* A node as the rectangle sees it. */
 struct sight {
-	float p[3], reach[3], radius, distance2;
+	lanes p, reach;
+	float radius, distance2;
 	int is_out; /* none of its cells can end the rectangle */
 };
 
-static void see(struct sight *sight, const struct search *s, const struct rectangle *r, const struct cell_ball *ball)
+static inline void see(struct sight *sight, const struct search *s, const struct cell_ball *ball)
 {
-	float away[3];
-	const float *p = sight->p, *reach = sight->reach, radius = ball->radius;
+	const lanes middle = sight_middle(ball), half = sight_half(ball), away = middle - s->frame.at;
+	const lanes widest = lanes_all(half[3]), square = away * away;
+	lanes size;
 
-	v3f_sub(away, ball->middle, r->at);
-	sight->distance2 = v3f_dot(away, away);
+	sight->radius = middle[3];
+	sight->distance2 = square[0] + square[1] + square[2];
 	sight->is_out = 1;
-	for (int k = 0; k < 3; k++)
-		if (!(fabsf(away[k]) <= ball->half[k] + s->box[k] + s->per_widest[k] * ball->widest))
-			return;
-	m3f_apply(sight->p, (const float (*)[3])r->axis, away);
-	sight->radius = radius;
-	for (int k = 0; k < 3; k++)
-		sight->reach[k] = rectangle_reach(r, k, ball);
-	sight->is_out = (fabsf(p[0]) + reach[0] <= s->free[0] && fabsf(p[1]) + reach[1] <= s->free[1]) ||
-	                !(fabsf(p[0]) <= r->extent[0] + reach[0] && fabsf(p[1]) <= r->extent[1] + reach[1] &&
-	                  fabsf(p[2]) <= r->deep + 4 * r->height + 2 * ball->widest + reach[2]);
+	if (lanes_any(~(lanes_size(away) <= half + s->box + s->per_widest * widest)))
+		return;
+	sight->p = sight_turned(s->frame.axis, away);
+	sight->reach = sight_turned(s->frame.slant, half);
+	size = lanes_size(sight->p);
+	sight->is_out = !lanes_any(~(size + sight->reach <= s->free_one)) ||
+	                lanes_any(~(size <= s->limit + (lanes){ 0, 0, 2, 0 } * widest + sight->reach));
 }
 
-static void look_below(struct search *s, const struct fitting *f, const struct rectangle *r, size_t i,
-                   const struct sight *sight)
+/* A node of the cells begin..end of the tree's order, which is known without a look at it. */
+struct below {
+	size_t i;
+	uint32_t begin, end;
+};
+
+static void look_below(struct search *s, const struct fitting *f, const struct rectangle *r, struct below node,
+                       const struct sight *sight)
 {
 	const struct cell_tree *tree = f->look.tree;
-	const float u = fabsf(sight->p[0]) - sight->reach[0], v = fabsf(sight->p[1]) - sight->reach[1];
+	const lanes nearest = lanes_size(sight->p) - sight->reach;
+	const uint32_t half = node.begin + (node.end - node.begin) / 2;
 	struct sight child[2];
-	size_t near;
+	float p[3];
+	int near;
 
 	if (sight->is_out || s->left < 0 ||
-	    bars_is_behind(&s->bars, (u > 0 ? u : 0) + s->over[0], (v > 0 ? v : 0) + s->over[1]))
+	    bars_is_behind(&s->bars, (nearest[0] > 0 ? nearest[0] : 0) + s->over[0],
+	                   (nearest[1] > 0 ? nearest[1] : 0) + s->over[1]))
 		return;
-	if (cell_node_is_leaf(&tree->node[i])) {
-		look_at(s, f, r, &f->look.surface->cell[tree->order[tree->node[i].begin]], sight->radius);
-	} else if (!rectangle_suits_node(&f->look, r, i, sight->p)) {
-		s->left -= 2;
-		for (size_t k = 0; k < 2; k++)
-			see(&child[k], s, r, &tree->ball[2 * i + 1 + k]);
-		/* The nearer half first: its bars are before most of the other's. */
-		near = child[1].distance2 < child[0].distance2;
-		look_below(s, f, r, 2 * i + 1 + near, &child[near]);
-		look_below(s, f, r, 2 * i + 2 - near, &child[1 - near]);
+	if (node.end - node.begin == 1) {
+		look_at(s, f, r, &f->look.surface->cell[tree->order[node.begin]], sight->radius);
+		return;
+	}
+	memcpy(p, &sight->p, sizeof p);
+	if (rectangle_suits_node(&f->look, r, node.i, p))
+		return;
+	s->left -= 2;
+	for (size_t k = 0; k < 2; k++)
+		see(&child[k], s, &tree->ball[2 * node.i + 1 + k]);
+	/* The nearer half first: its bars are before most of the other's. */
+	near = child[1].distance2 < child[0].distance2;
+	for (int k = 0; k < 2; k++) {
+		const int second = k ^ near;
+
+		if (!child[second].is_out)
+			look_below(s, f, r, second ? (struct below){ 2 * node.i + 2, half, node.end }
+			                           : (struct below){ 2 * node.i + 1, node.begin, half }, &child[second]);
 	}
 }
 
 /* Ends the rectangle at the bars. Returns 0 if that is not known of all of them. */
 static int look_around(struct rectangle *r, const float free_one[2], struct search *s, const struct fitting *f)
 {
+	const struct cell_tree *tree = f->look.tree;
 	struct sight all;
 
-	memcpy(s->free, free_one, sizeof s->free);
 	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
+	sight_frame_of(&s->frame, r);
+	s->box = s->per_widest = lanes_all(INFINITY);
 	for (int k = 0; k < 3; k++) {
 		const float *u = r->slant[0], *v = r->slant[1], *n = r->slant[2];
 
 		s->box[k] = 1.00001f * (u[k] * r->extent[0] + v[k] * r->extent[1] + n[k] * (r->deep + 4 * r->height));
 		s->per_widest[k] = 1.00001f * (u[k] + v[k] + 2 * n[k]);
 	}
+	s->limit = (lanes){ r->extent[0], r->extent[1], r->deep + 4 * r->height, INFINITY };
+	s->free_one = (lanes){ free_one[0], free_one[1], INFINITY, INFINITY };
 	s->bars.n = 0;
 	s->left = f->looked - 1;
-	see(&all, s, r, &f->look.tree->ball[0]);
-	look_below(s, f, r, 0, &all);
-	bars_end(r->extent, &s->bars, s->free, f->overhang);
+	see(&all, s, &tree->ball[0]);
+	look_below(s, f, r, (struct below){ 0, tree->node[0].begin, tree->node[0].end }, &all);
+	bars_end(r->extent, &s->bars, free_one, f->overhang);
 	return s->left >= 0;
 }
 
