@@ -21,8 +21,9 @@ struct search {
 	struct bars bars;
 	struct sight_frame frame;
 	lanes box, per_widest; /* where what may end the rectangle is, along x, y and z from its place, and how much further
-	                        * for each unit of a cell's radius; lane 3 of this and the next two is anywhere */
+	                        * for each unit of a cell's radius; lane 3 of this and the next is anywhere */
 	lanes limit;           /* along u, v and the normal */
+	lanes sides;           /* along u and v alone: the rectangle's extents; the other lanes are anywhere, here and below */
 	lanes free_one;        /* half-sides of a rectangle that is known to have none */
 	float over[2];  /* how far the rectangle may reach over what ends it: the overhang, or half of a narrow one, which
 	                 * nothing would end otherwise */
@@ -60,20 +61,17 @@ static int is_crossing(struct search *s, const struct fitting *f, const struct r
 	       is_backed(&s->backing, &f->look, r, middle[0] * beyond, middle[1] * beyond);
 }
 
-/* Whether all corners are too far away to end the rectangle. */
-static int is_beyond(const float corner[4][3], const struct rectangle *r, const float over[2])
+/* Whether all corners are too far away to end the rectangle, along u or along v. */
+static inline int is_beyond(const lanes corner[4], const struct search *s)
 {
-	for (int k = 0; k < 2; k++) {
-		float low = INFINITY, high = -INFINITY;
+	lanes low = -corner[0], high = corner[0], nearest;
 
-		for (int c = 0; c < 4; c++) {
-			low = corner[c][k] < low ? corner[c][k] : low;
-			high = corner[c][k] > high ? corner[c][k] : high;
-		}
-		if ((low > 0 ? low : high < 0 ? -high : 0) + over[k] >= r->extent[k])
-			return 1;
+	for (int c = 1; c < 4; c++) {
+		low = lanes_greater(low, -corner[c]);
+		high = lanes_greater(high, corner[c]);
 	}
-	return 0;
+	nearest = lanes_greater(lanes_greater(-low, -high), lanes_all(0));
+	return lanes_any(nearest + (lanes){ s->over[0], s->over[1], 0, 0 } >= s->sides);
 }
 
 /* The surface that goes on beside the rectangle leaves S_p gradually: a cell that S_p runs through, or that is within
@@ -82,14 +80,17 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
                     const struct dpoint_cell *cell, float radius)
 {
 	float corner[4][3], above[4], middle[3] = { 0, 0, 0 }, off;
+	lanes seen[4];
 	struct bar bar;
 
+	for (int c = 0; c < 4; c++)
+		seen[c] = sight_turned(s->frame.axis, sight_place(cell->corner[c]) - s->frame.at);
+	if (is_beyond(seen, s) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
+		return;
 	for (int c = 0; c < 4; c++) {
-		rectangle_sees(corner[c], r, cell->corner[c]);
+		memcpy(corner[c], &seen[c], sizeof corner[c]);
 		v3f_add_scaled(middle, middle, 0.25f, corner[c]);
 	}
-	if (is_beyond((const float (*)[3])corner, r, s->over) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
-		return;
 	off = fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1]));
 	if (off > 2 * radius + 4 * r->height || rectangle_suits_off(&f->look, r, cell, middle, off))
 		return;
@@ -186,6 +187,7 @@ static int look_around(struct rectangle *r, const float free_one[2], struct sear
 		s->per_widest[k] = 1.00001f * (u[k] + v[k] + 2 * n[k]);
 	}
 	s->limit = (lanes){ r->extent[0], r->extent[1], r->deep + 4 * r->height, INFINITY };
+	s->sides = (lanes){ r->extent[0], r->extent[1], INFINITY, INFINITY };
 	s->free_one = (lanes){ free_one[0], free_one[1], INFINITY, INFINITY };
 	s->bars.n = 0;
 	s->left = f->looked - 1;

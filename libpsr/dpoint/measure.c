@@ -1,12 +1,21 @@
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
 #include "cell_tree.h"
 
+#define CHUNK 1024 /* candidates */
+
 struct sums {
-	struct dpoint_errors *errors;
-	double normal2, height2;
+	double normal2, height2, normal_worst, height_worst;
 	uint64_t n;
+};
+
+struct measuring {
+	const struct dpoint_surface *surface;
+	const struct dpoint_cover *cover;
+	const struct dpoint_choice *choice;
+	struct sums *of_chunk;
 };
 
 /* The angle between vectors by its tangent's half, in double: exact for small ones, too. */
@@ -46,27 +55,50 @@ static void add(struct sums *sums, const struct dpoint *p, const struct dpoint_c
 	sums->n++;
 	sums->normal2 += angle * angle;
 	sums->height2 += height * height;
-	sums->errors->normal_worst = fmax(sums->errors->normal_worst, angle);
-	sums->errors->height_worst = fmax(sums->errors->height_worst, height);
+	sums->normal_worst = fmax(sums->normal_worst, angle);
+	sums->height_worst = fmax(sums->height_worst, height);
 }
 
-void dpoint_measure(struct dpoint_errors *errors, const struct dpoint_surface *surface,
-                    const struct dpoint_cover *cover, const struct dpoint_choice *choice)
+static void measure_chunk(int chunk, void *userdata)
 {
-	struct sums sums = { .errors = errors };
+	const struct measuring *m = userdata;
+	const struct dpoint_cover *cover = m->cover;
+	const size_t begin = (size_t)chunk * CHUNK;
 
-	memset(errors, 0, sizeof *errors);
-	for (uint32_t i = 0; i < cover->n_candidates; i++) {
-		for (uint32_t k = 0; k < cover->n[i] && choice->is_kept[i]; k++) {
+	for (size_t i = begin; i < cover->n_candidates && i < begin + CHUNK; i++)
+		for (uint32_t k = 0; k < cover->n[i] && m->choice->is_kept[i]; k++) {
 			const struct cell_node *node = &cover->tree->node[cover->list[i][k]];
 
 			for (uint32_t e = node->begin; e < node->end; e++)
-				add(&sums, &surface->candidate[i].point, &surface->cell[cover->tree->order[e]]);
+				add(&m->of_chunk[chunk], &m->surface->candidate[i].point, &m->surface->cell[cover->tree->order[e]]);
 		}
+}
+
+int dpoint_measure(struct dpoint_errors *errors, const struct dpoint_surface *surface, const struct dpoint_cover *cover,
+                   const struct dpoint_choice *choice, struct psr_pool *pool)
+{
+	const int n_chunks = (int)((cover->n_candidates + CHUNK - 1) / CHUNK);
+	struct measuring m = { surface, cover, choice, calloc((size_t)n_chunks + 1, sizeof *m.of_chunk) };
+	struct sums all = { 0 };
+
+	memset(errors, 0, sizeof *errors);
+	if (m.of_chunk == NULL)
+		return PSR_ERR_MEMORY;
+	psr_pool_for(pool, n_chunks, measure_chunk, &m);
+	for (int i = 0; i < n_chunks; i++) {
+		const struct sums *sums = &m.of_chunk[i];
+
+		all.n += sums->n;
+		all.normal2 += sums->normal2;
+		all.height2 += sums->height2;
+		errors->normal_worst = fmax(errors->normal_worst, sums->normal_worst);
+		errors->height_worst = fmax(errors->height_worst, sums->height_worst);
 	}
-	if (sums.n == 0)
-		return;
-	errors->normal_rms = sqrt(sums.normal2 / (double)sums.n);
-	errors->height_rms = sqrt(sums.height2 / (double)sums.n);
-	errors->overlap = (double)sums.n / (double)(cover->n_cells - choice->n_holes);
+	free(m.of_chunk);
+	if (all.n == 0)
+		return PSR_OK;
+	errors->normal_rms = sqrt(all.normal2 / (double)all.n);
+	errors->height_rms = sqrt(all.height2 / (double)all.n);
+	errors->overlap = (double)all.n / (double)(cover->n_cells - choice->n_holes);
+	return PSR_OK;
 }

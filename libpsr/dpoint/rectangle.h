@@ -45,12 +45,6 @@ static inline void rectangle_sees(float at[3], const struct rectangle *r, const 
 	m3f_apply(at, (const float (*)[3])r->axis, away);
 }
 
-/* How far the node's box reaches along an axis of the rectangle. */
-static inline float rectangle_reach(const struct rectangle *r, int axis, const struct cell_ball *ball)
-{
-	return v3f_dot(r->slant[axis], ball->half);
-}
-
 /* Whether in the cell's middle, `at` in the rectangle's frame, height and normal are S_p's, and
  * its look is the point's, as the options say. */
 int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,

@@ -22,6 +22,7 @@ struct sealing {
 	const struct dpoint_surface *surface;
 	const struct dpoint_cover_options *options;
 	struct lid *lid;
+	uint32_t *over;        /* by cell: a lid that covers it, or UINT32_MAX; NULL: not known */
 	struct cell_tree tree; /* of the lids' corners */
 	uint8_t *is_open;      /* by cell */
 	uint8_t *is_due;       /* likewise: open, and none of the candidates that come is over it */
@@ -143,17 +144,40 @@ static void put_first(struct nearby *nearby, const float at[3])
 	}
 }
 
+static void place_of(float place[3], const struct dpoint_cell *cell, const float middle[3], int p)
+{
+	const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
+
+	for (int k = 0; k < 3; k++)
+		place[k] = p == 8 ? middle[k] : middle[k] + INWARDS * (0.5f * (corner[k] + next[k]) - middle[k]);
+}
+
+/* Whether the lid alone stops all rays to a cell of one side: most cells have such a one among those that cover them. */
+static int stops_all(const struct sealing *s, const struct lid *lid, const struct dpoint_cell *cell,
+                     const float middle[3], const float normal[3])
+{
+	if (dpoint_is_two_sided(s->options, cell->part))
+		return 0;
+	for (int p = PLACES; p-- > 0;) {
+		float place[3], seen[3];
+
+		place_of(place, cell, middle, p);
+		rectangle_sees(seen, &lid->rectangle, place);
+		if (!lid_stops_all(lid, seen, normal, s->behind))
+			return 0;
+	}
+	return 1;
+}
+
 /* Whether these lids stop all rays to the cell, from both sides if it has two. */
 static int stops_rays(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
                       const float (*from)[DIRECTIONS][3], const float middle[3])
 {
 	for (int side = 0; side < 1 + dpoint_is_two_sided(s->options, cell->part); side++)
 		for (int p = 0; p < PLACES; p++) {
-			const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
 			float place[3];
 
-			for (int k = 0; k < 3; k++)
-				place[k] = p == 8 ? middle[k] : middle[k] + INWARDS * (0.5f * (corner[k] + next[k]) - middle[k]);
+			place_of(place, cell, middle, p);
 			if (!is_sealed_at(s, nearby, place, from[side], from[side][0]))
 				return 0;
 		}
@@ -171,6 +195,8 @@ static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at
 	for (int d = 0; d < DIRECTIONS; d++)
 		v3f_scale(from[1][d], from[0][d], -1);
 	dpoint_cell_middle(middle, cell);
+	if (s->over != NULL && s->over[at] != UINT32_MAX && stops_all(s, &s->lid[s->over[at]], cell, middle, from[0][0]))
+		return 1;
 	for (int c = 0; c < 4; c++) {
 		v3f_sub(away, cell->corner[c], middle);
 		radius = fmaxf(radius, v3f_length(away));
@@ -222,6 +248,22 @@ static int make_lids(struct sealing *s, const struct dpoint_choice *choice, stru
 	rc = cell_tree_init(&s->tree, cell, n, pool);
 	free(cell);
 	return rc;
+}
+
+static void find_over(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_cover *cover)
+{
+	uint32_t n = 0;
+
+	memset(s->over, 0xff, s->surface->n_cells * sizeof *s->over);
+	for (uint32_t i = 0; i < cover->n_candidates; i++) {
+		for (uint32_t k = 0; k < cover->n[i] && choice->is_kept[i]; k++) {
+			const struct cell_node *node = &cover->tree->node[cover->list[i][k]];
+
+			for (uint32_t c = node->begin; c < node->end; c++)
+				s->over[cover->tree->order[c]] = n;
+		}
+		n += choice->is_kept[i];
+	}
 }
 
 /* ---- what comes in their way ---- */
@@ -332,11 +374,15 @@ int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dp
 	set_around(&s);
 	s.is_open = malloc(surface->n_cells);
 	s.is_due = malloc(surface->n_cells);
-	rc = s.is_open != NULL && s.is_due != NULL ? PSR_OK : PSR_ERR_MEMORY;
+	s.over = malloc(surface->n_cells * sizeof *s.over);
+	rc = s.is_open != NULL && s.is_due != NULL && s.over != NULL ? PSR_OK : PSR_ERR_MEMORY;
 	if (rc == PSR_OK) {
 		memset(s.is_open, 1, surface->n_cells);
+		find_over(&s, choice, cover);
 		rc = look_all(&s, choice, work);
 	}
+	free(s.over); /* of these lids */
+	s.over = NULL;
 	if (rc == PSR_OK)
 		rc = keep_more(&s, choice, cover);
 	if (rc == PSR_OK)

@@ -25,6 +25,13 @@ static inline lanes lanes_size(lanes x)
 	return (lanes)((lanes_if)x & INT32_MAX);
 }
 
+static inline lanes lanes_greater(lanes a, lanes b)
+{
+	const lanes_if is_greater = b > a;
+
+	return (lanes)(((lanes_if)b & is_greater) | ((lanes_if)a & ~is_greater));
+}
+
 static inline int lanes_any(lanes_if x)
 {
 	int64_t half[2];
@@ -33,9 +40,14 @@ static inline int lanes_any(lanes_if x)
 	return (half[0] | half[1]) != 0;
 }
 
+static inline lanes sight_place(const float p[3])
+{
+	return (lanes){ p[0], p[1], p[2], 0 };
+}
+
 static inline void sight_frame_of(struct sight_frame *f, const struct rectangle *r)
 {
-	f->at = (lanes){ r->at[0], r->at[1], r->at[2], 0 };
+	f->at = sight_place(r->at);
 	for (int k = 0; k < 3; k++) {
 		f->axis[k] = (lanes){ r->axis[0][k], r->axis[1][k], r->axis[2][k], 0 };
 		f->slant[k] = (lanes){ r->slant[0][k], r->slant[1][k], r->slant[2][k], 0 };

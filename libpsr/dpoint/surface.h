@@ -167,8 +167,8 @@ struct dpoint_errors {
 	double height_rms, height_worst; /* inner units */
 	double overlap;                  /* kept points a covered cell */
 };
-void dpoint_measure(struct dpoint_errors *errors, const struct dpoint_surface *surface,
-                    const struct dpoint_cover *cover, const struct dpoint_choice *choice);
+int dpoint_measure(struct dpoint_errors *errors, const struct dpoint_surface *surface, const struct dpoint_cover *cover,
+                   const struct dpoint_choice *choice, struct psr_pool *pool); /* MEMORY; pool may be NULL */
 
 /* How far the kept points' quadrics are from the surface's facets, over all of their rectangles. */
 struct dpoint_bounds {

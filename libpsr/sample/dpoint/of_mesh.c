@@ -113,8 +113,9 @@ int dpoint_finish(struct dpoint_set *set, struct dpoint_build_report *report, st
 		rc = dpoint_set_make(set, &(struct dpoint_grouping){ surface, &choice, cover_options.sine, two_sided });
 	if (rc == PSR_OK)
 		rc = dpoint_bounds_measure(&bounds, surface, &choice, &cover_options, options->pool);
+	if (rc == PSR_OK)
+		rc = dpoint_measure(&errors, surface, &cover, &choice, options->pool);
 	if (rc == PSR_OK) {
-		dpoint_measure(&errors, surface, &cover, &choice);
 		set->height = (float)fmin(bounds.worst + BOUND_PACKING, 2);
 		*report = (struct dpoint_build_report){ .n_candidates = surface->n_candidates, .n_kept = choice.n_kept,
 			                                    .n_open = choice.n_holes, .n_bad = surface->n_bad,

@@ -1,4 +1,5 @@
 /* The pieces of a mesh and of its patches, which threads make side by side. */
+#define _GNU_SOURCE
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,20 +76,38 @@ struct parts {
 	struct building *b;
 	struct dpoint_cover_options cover;
 	struct part *part;
+	uint32_t *order; /* of the parts: those of many triangles first, so that no thread begins the longest one last */
 	uint32_t n;
 	size_t n_cells; /* so far; beyond the limit no other part is begun */
 	struct psr_error err;
 	int rc;         /* of the mesh */
 };
 
+static int compare_patches(const void *a, const void *b, void *userdata)
+{
+	const struct psr_patch *patch = userdata;
+	const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+
+	if (patch[x].n_triangles != patch[y].n_triangles)
+		return patch[x].n_triangles > patch[y].n_triangles ? -1 : 1;
+	return x < y ? -1 : x > y;
+}
+
 static int parts_init(struct parts *p, struct building *b)
 {
 	*p = (struct parts){ .b = b, .cover = building_cover(b->options), .n = b->mesh->n_patches };
 	p->part = calloc((size_t)p->n + 1, sizeof *p->part);
-	if (p->part == NULL)
+	p->order = malloc(((size_t)p->n + 1) * sizeof *p->order);
+	if (p->part == NULL || p->order == NULL) {
+		free(p->part);
+		free(p->order);
 		return psr_fail(b->err, PSR_ERR_MEMORY, "no memory for %u patches", p->n);
-	for (uint32_t i = 0; i < p->n; i++)
+	}
+	for (uint32_t i = 0; i < p->n; i++) {
 		dpoint_surface_init(&p->part[i].surface);
+		p->order[i] = i;
+	}
+	qsort_r(p->order, p->n, sizeof *p->order, compare_patches, b->mesh->patch);
 	return PSR_OK;
 }
 
@@ -97,6 +116,7 @@ static void parts_fini(struct parts *p)
 	for (uint32_t i = 0; i < p->n; i++)
 		dpoint_surface_fini(&p->part[i].surface);
 	free(p->part);
+	free(p->order);
 }
 
 /* A patch looks as its first triangle does; one whose triangles are all without an area has no look. */
@@ -160,7 +180,7 @@ static void sample(int i, void *userdata)
 	if (i == 0)
 		sample_mesh(p);
 	else
-		sample_patch(p, &p->part[i - 1]);
+		sample_patch(p, &p->part[p->order[i - 1]]);
 }
 
 /* Adds a part's cells, candidates and facets after those that are there. */

@@ -37,11 +37,15 @@ static int measure(double value[N_COLUMNS], const struct study_model *model, str
 	dpoint_surface_init(&surface);
 	rc = dpoint_sample_mesh(&surface, model->mesh, &mesh, study->err);
 	value[PIECES] = (double)surface.n_candidates;
-	if (rc == PSR_OK && (rc = dpoint_simplify(&choice, &cover, &surface, &with, 4, study->pool, NULL)) != PSR_OK)
-		psr_fail(study->err, rc, "no memory for the points of %s", model->name);
 	if (rc == PSR_OK) {
+		rc = dpoint_simplify(&choice, &cover, &surface, &with, 4, study->pool, NULL);
 		value[SECONDS] = clock_seconds() - start;
-		dpoint_measure(&errors, &surface, &cover, &choice);
+		if (rc == PSR_OK)
+			rc = dpoint_measure(&errors, &surface, &cover, &choice, study->pool);
+		if (rc != PSR_OK)
+			psr_fail(study->err, rc, "no memory for the points of %s", model->name);
+	}
+	if (rc == PSR_OK) {
 		value[TRIANGLES] = model->mesh->n_triangles;
 		value[BAD] = (double)surface.n_bad;
 		value[POINTS] = (double)choice.n_kept;

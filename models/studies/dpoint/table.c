@@ -106,11 +106,11 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 		rc = choose(&choice, row->way, &surface, &cover);
 	if (rc == PSR_OK && row->way == FITTED)
 		rc = dpoint_set_make(&set, &(struct dpoint_grouping){ &surface, &choice, options.sine, NULL });
-	if (rc == PSR_OK) {
-		value[SECONDS] = clock_seconds() - start;
-		dpoint_measure(&errors, &surface, &cover, &choice);
+	value[SECONDS] = clock_seconds() - start;
+	if (rc == PSR_OK)
+		rc = dpoint_measure(&errors, &surface, &cover, &choice, study->pool);
+	if (rc == PSR_OK)
 		put(value, row, &surface, &choice, &errors);
-	}
 	if (rc == PSR_OK && row->way == FITTED)
 		value[BYTES] = (double)dpoint_set_bytes(&set) / 1e3;
 	dpoint_set_fini(&set);

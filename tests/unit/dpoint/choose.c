@@ -427,7 +427,7 @@ static void of_nothing_nothing_is_chosen(void **state)
 	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
 	assert_int_equal(choice.n_kept, 0);
 	assert_int_equal(choice.n_holes, 1);
-	dpoint_measure(&errors, &surface, &cover, &choice);
+	assert_int_equal(dpoint_measure(&errors, &surface, &cover, &choice, NULL), PSR_OK);
 	assert_true(errors.normal_worst == 0 && errors.overlap == 0);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);

@@ -30,7 +30,7 @@ static inline void points_of_patch(struct dpoint_set *set, const struct dpoint_p
 	for (size_t i = 0; i < surface.n_candidates; i++)
 		surface.candidate[i].point.attr = attr;
 	assert_int_equal(dpoint_set_make(set, &(struct dpoint_grouping){ &surface, &choice, options.sine, NULL }), PSR_OK);
-	dpoint_measure(&errors, &surface, &cover, &choice);
+	assert_int_equal(dpoint_measure(&errors, &surface, &cover, &choice, NULL), PSR_OK);
 	/* Measured in the middles of cells, of which corners are further off, before places are rounded. */
 	set->height = (float)(2 * errors.height_worst) + options.slack;
 	dpoint_choice_fini(&choice);
