@@ -1,5 +1,4 @@
 /* The pieces of a mesh and of its patches, which threads make side by side. */
-#define _GNU_SOURCE
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,25 +71,28 @@ struct part {
 	int rc;
 };
 
+struct size {
+	uint32_t n_triangles, patch;
+};
+
 struct parts {
 	struct building *b;
 	struct dpoint_cover_options cover;
 	struct part *part;
-	uint32_t *order; /* of the parts: those of many triangles first, so that no thread begins the longest one last */
+	struct size *order; /* those of many triangles first, so that no thread begins the longest one last */
 	uint32_t n;
 	size_t n_cells; /* so far; beyond the limit no other part is begun */
 	struct psr_error err;
 	int rc;         /* of the mesh */
 };
 
-static int compare_patches(const void *a, const void *b, void *userdata)
+static int compare_sizes(const void *a, const void *b)
 {
-	const struct psr_patch *patch = userdata;
-	const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+	const struct size *x = a, *y = b;
 
-	if (patch[x].n_triangles != patch[y].n_triangles)
-		return patch[x].n_triangles > patch[y].n_triangles ? -1 : 1;
-	return x < y ? -1 : x > y;
+	if (x->n_triangles != y->n_triangles)
+		return x->n_triangles > y->n_triangles ? -1 : 1;
+	return x->patch < y->patch ? -1 : x->patch > y->patch;
 }
 
 static int parts_init(struct parts *p, struct building *b)
@@ -105,9 +107,9 @@ static int parts_init(struct parts *p, struct building *b)
 	}
 	for (uint32_t i = 0; i < p->n; i++) {
 		dpoint_surface_init(&p->part[i].surface);
-		p->order[i] = i;
+		p->order[i] = (struct size){ b->mesh->patch[i].n_triangles, i };
 	}
-	qsort_r(p->order, p->n, sizeof *p->order, compare_patches, b->mesh->patch);
+	qsort(p->order, p->n, sizeof *p->order, compare_sizes);
 	return PSR_OK;
 }
 
@@ -180,7 +182,7 @@ static void sample(int i, void *userdata)
 	if (i == 0)
 		sample_mesh(p);
 	else
-		sample_patch(p, &p->part[p->order[i - 1]]);
+		sample_patch(p, &p->part[p->order[i - 1].patch]);
 }
 
 /* Adds a part's cells, candidates and facets after those that are there. */

@@ -336,7 +336,7 @@ static void narrow_triangles_have_pieces_that_are_not(void **state)
  * 1.42 times as long. */
 static void pieces_are_cut_where_normals_turn(void **state)
 {
-	const double turn = 0.1;
+	const double most = 0.1;
 	struct grid_mesh *m = malloc(sizeof *m);
 	size_t n[2];
 
@@ -344,7 +344,7 @@ static void pieces_are_cut_where_normals_turn(void **state)
 	assert_non_null(m);
 	round_mesh(m, 1, 40);
 	for (int k = 0; k < 2; k++) {
-		const struct dpoint_mesh_options options = { .scale = 1, .cell = 0.2, .delta = 0.1f, .turn = k * turn };
+		const struct dpoint_mesh_options options = { .scale = 1, .cell = 0.2, .delta = 0.1f, .turn = k * most };
 		struct dpoint_surface surface;
 
 		dpoint_surface_init(&surface);
@@ -357,7 +357,7 @@ static void pieces_are_cut_where_normals_turn(void **state)
 				for (int j = 0; j < 3; j++)
 					side[j] = (double)surface.cell[c].corner[(i + 1) % 4][j] - (double)surface.cell[c].corner[i][j];
 				/* Chords of 1/40 of a turn bend normals by up to 1.01 of what the torus does. */
-				assert_true(v3d_length(side) <= 1.01 * 1.4 * turn || v3d_length(side) <= 0.2 / 4 * 1.5);
+				assert_true(v3d_length(side) <= 1.01 * 1.4 * most || v3d_length(side) <= 0.2 / 4 * 1.5);
 			}
 		dpoint_surface_fini(&surface);
 	}
