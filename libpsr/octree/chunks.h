@@ -8,7 +8,7 @@
 #define CHUNKS_STEP 32
 #define CHUNKS_ENTRY 12 /* and 4 a stream */
 #define CHUNKS_WAY_FAST 0
-#define CHUNKS_WAY_SMALL 3
+#define CHUNKS_WAY_SMALL 4
 
 /* What a step adds to a chunk. */
 struct chunk_step {

@@ -2,7 +2,7 @@
  * tree; with those before it, it is a tree that ends there ([B] 4.4). All integers are little-endian:
  *
  *   u8  levels
- *   u8  way         of the codes: 0 OCTREE_FAST, 3 OCTREE_SMALL; 1 and 2 were in no release
+ *   u8  way         of the codes: 0 OCTREE_FAST, 4 OCTREE_SMALL; 1 to 3 were in no release
  *   u8  cut         a depth: subtrees of its nodes are packed in chunks
  *   u8  streams     bit s: there is stream s of enum octree_stream
  *   u32 n_chunks

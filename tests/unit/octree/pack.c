@@ -178,6 +178,25 @@ static void a_header_that_lies_is_refused(void **state)
 	octree_destroy(tree);
 }
 
+/* Those that small trees were packed by before the first release. */
+static void older_ways_are_refused(void **state)
+{
+	struct octree *tree = make(9, 200), *again;
+	struct psr_error err;
+	uint8_t *bytes;
+	size_t n;
+
+	(void)state;
+	assert_int_equal(octree_pack(&bytes, &n, tree, OCTREE_SMALL, NULL, NULL), PSR_OK);
+	for (uint8_t way = 1; way < 4; way++) {
+		bytes[1] = way;
+		assert_int_equal(octree_unpack(&again, bytes, n, UINT64_MAX, NULL, &err), PSR_ERR_FORMAT);
+		assert_non_null(strstr(err.text, (const char[]){ 'w', 'a', 'y', ' ', (char)('0' + way), '\0' }));
+	}
+	free(bytes);
+	octree_destroy(tree);
+}
+
 /* The first byte of all may be 255, which elsewhere waits for a carry; so may some that follow. */
 static void bits_of_a_small_chance_come_back_wherever_they_stand(void **state)
 {
@@ -239,6 +258,7 @@ int main(void)
 		cmocka_unit_test(what_is_cut_short_or_longer_is_refused),
 		cmocka_unit_test(the_last_bytes_have_one_value),
 		cmocka_unit_test(a_header_that_lies_is_refused),
+		cmocka_unit_test(older_ways_are_refused),
 		cmocka_unit_test(bits_of_a_small_chance_come_back_wherever_they_stand),
 		cmocka_unit_test(a_tree_takes_only_its_own_bytes),
 	};
