@@ -50,6 +50,7 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 
 	stack->gap = warp_gap(w);
 	stack->exponent = plan->exponent;
+	stack->place_bits = plan->place_bits;
 	const size_t n_words = (size_t)(w + stack->gap) * h;
 	b->pixels = psr_grow_huge(b->pixels, &b->pixels_size,
 	                          n_words * sizeof *stack->word + area * 4 * sizeof *b->weight + n_cells * sizeof(float)

@@ -219,6 +219,8 @@ static void shade_one(int row, void *userdata)
 			r->simd->depth_row(r->depth + first, word, plan->width, b->stack.exponent);
 		if (r->has_planes && !plan_is_cancelled(plan))
 			planes_row(r->simd, plan, r->frame, word, b->weight + first, y);
+		if (r->place != NULL)
+			r->simd->smooth_places(r->place + first, word, b->weight + first, plan->width);
 	}
 	const uint64_t middle = clock_ns();
 	if (r->picture.wants != NULL)
@@ -292,11 +294,13 @@ static int begin_finish(struct psr_renderer *r, enum psr_why smooth, struct psr_
 	uint8_t *rgb = r->frame->rgb;
 
 	r->depth = r->frame->depth;
+	r->place = NULL;
 	if (smooth == PSR_WHY_RAN) {
 		if (smooth_begin(&r->smooth, &r->plan, r->frame->depth))
 			return explain(PSR_ERR_MEMORY, r, "smoothing", err);
 		rgb = r->smooth.rgb;
 		r->depth = r->smooth.depth;
+		r->place = r->smooth.place;
 	}
 	if (r->plan.has_sheer && (has_colors(r) || r->has_planes) && r->depth == NULL) {
 		r->depth = sheer_depths(&r->sheer, &r->plan);

@@ -13,6 +13,8 @@
 /* The near distance, as a part of the scene's extent, if the request sets none. */
 #define AUTO_NEAR (1.0 / 16384)
 
+#define MOST_PLACED_SLOTS (UINT32_MAX / (PSR_BLOCK_SAMPLES << PSR_PLACE_BITS))
+
 /* The camera's axes in the world (rows right, down, forward), its eye, and the scale of lengths. */
 struct view {
 	double axis[3][3], eye[3];
@@ -231,6 +233,14 @@ static uint16_t light16(double linear, int is_wide)
 	return is_wide ? psr_root_of_light((float)linear) : (uint16_t)(fmin(linear, 1) * 65535 + 0.5);
 }
 
+/* Leaves and points have no places, and ids of many blocks leave no bits. */
+static unsigned words_place_bits(const struct plan *plan)
+{
+	const int is_of_blocks = !plan->has_octrees && !plan->has_points && !plan->with_splats;
+
+	return plan->is_smooth && is_of_blocks && plan->n_slots <= MOST_PLACED_SLOTS ? PSR_PLACE_BITS : 0;
+}
+
 int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
               struct psr_error *err)
 {
@@ -273,6 +283,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->with_ewa = settings->with_ewa && plan->has_octrees;
 	plan->with_runs = plan->has_octrees && !plan->with_ewa && !plan->with_splats && !plan->is_full;
 	plan->is_smooth = settings->smooth != PSR_SMOOTH_NONE;
+	plan->place_bits = words_place_bits(plan);
 	plan->is_wide = settings->is_wide;
 	plan->cancel = settings->cancel;
 	plan->exponent = scene_exponent(scene);

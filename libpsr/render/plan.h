@@ -35,6 +35,7 @@ struct plan {
 	int asks_ewa, with_ewa; /* the latter: and an instance is drawn as an octree */
 	int with_runs;          /* bins->cubes says which cubes of a run an entry draws; else each is an entry */
 	int is_smooth;
+	unsigned place_bits;       /* of words: of smooth pictures of blocks; else 0 */
 	int is_wide;
 	unsigned cull_tests;
 	int is_full;

@@ -14,7 +14,9 @@ static void put_words(const struct simd *simd, const struct plan *plan, uint64_t
 		uint32_t bits;
 
 		memcpy(&bits, &z[x], sizeof bits);
-		to[x] = (uint64_t)bits << 32 | (uint32_t)word[x];
+		const uint32_t low = (uint32_t)word[x];
+
+		to[x] = (uint64_t)bits << 32 | (word[x] == PSR_WORD_EMPTY ? low : low >> plan->place_bits);
 	}
 }
 
@@ -185,7 +187,7 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
 		if (frame->normal == NULL && frame->id == NULL && frame->block == NULL && frame->bound == NULL)
 			continue;
 		pixels.x0 = x;
-		simd->strip_list(&pixels, word + x, weight + x, n);
+		simd->strip_list(&pixels, word + x, weight + x, n, plan->place_bits);
 		clear_samples(frame, first, n);
 		put_samples(simd, plan, frame, first, &pixels);
 		if (frame->bound != NULL)
@@ -199,7 +201,7 @@ void planes_over(const struct simd *simd, const struct plan *plan, const struct 
 	const size_t first = (size_t)part->y * plan->width + part->x;
 	struct strip_pixels pixels = { .x0 = part->x, .y = part->y };
 
-	simd->strip_list(&pixels, word, NULL, part->n);
+	simd->strip_list(&pixels, word, NULL, part->n, 0);
 	put_samples(simd, plan, frame, first, &pixels);
 	for (uint32_t i = 0; frame->weight != NULL && i < pixels.n; i++)
 		frame->weight[first + pixels.x[i]] = UINT8_MAX;

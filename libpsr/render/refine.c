@@ -117,16 +117,25 @@ uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
 	return (w < WINDOW_WIDTH ? w : WINDOW_WIDTH) * (h < WINDOW_HEIGHT ? h : WINDOW_HEIGHT);
 }
 
-/* The mean of the 2x2 colours of a fine picture, which smoothing has clamped. */
-static void average_codes(const struct part *part, size_t first, size_t at)
+static int are_equal(const uint8_t *top, const uint8_t *bottom)
+{
+	return memcmp(top, bottom, 6) == 0 && memcmp(top, top + 3, 3) == 0;
+}
+
+/* The means of the 2x2 colours of n pixels of a fine picture, which smoothing has clamped. */
+static void average_codes(uint8_t *to, const struct part *part, size_t first, uint32_t n)
 {
 	const uint8_t *top = part->rgb + 3 * first, *bottom = top + 3 * (size_t)part->stride;
 	const uint32_t *linear = part->refiner->linear;
+	const uint8_t *srgb = part->refiner->srgb;
 
-	for (size_t c = 0; c < 3; c++) {
-		const uint32_t sum = linear[top[c]] + linear[top[c + 3]] + linear[bottom[c]] + linear[bottom[c + 3]];
-
-		part->frame->rgb[3 * at + c] = part->refiner->srgb[(sum + 2) >> 2];
+	for (uint32_t x = 0; x < n; x++, to += 3, top += 6, bottom += 6) {
+		if (are_equal(top, bottom)) {
+			memcpy(to, top, 3);
+			continue;
+		}
+		for (size_t c = 0; c < 3; c++)
+			to[c] = srgb[(linear[top[c]] + linear[top[c + 3]] + linear[bottom[c]] + linear[bottom[c + 3]] + 2) >> 2];
 	}
 }
 
@@ -152,8 +161,8 @@ static void average_row(int row, void *userdata)
 	const size_t at = (size_t)y * part->frame->width + part->x0;
 	uint16_t light[WINDOW_WIDTH];
 
-	for (uint32_t x = 0; part->rgb != NULL && x < n; x++)
-		average_codes(part, first + 2 * (size_t)x, at + x);
+	if (part->rgb != NULL)
+		average_codes(part->frame->rgb + 3 * at, part, first, n);
 	for (uint32_t c = 0; part->rgb == NULL && part->frame->rgb != NULL && c < 3; c++) {
 		if (part->pass == 1)
 			average_around(light, part, (uint32_t)row, n, c);

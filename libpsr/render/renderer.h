@@ -32,6 +32,7 @@ struct psr_renderer {
 	int has_planes; /* the frame has more planes than colour and depth */
 	struct shade_picture picture;
 	float *depth; /* where depths go, or NULL */
+	uint8_t *place; /* where places of smoothing go, or NULL */
 };
 
 static inline int has_colors(const struct psr_renderer *r)

@@ -86,10 +86,11 @@ static uint32_t list_strip(struct strip_pixels *pixels, const struct shading *s,
 	pixels->x0 = x;
 	pixels->y = y;
 	if (plan_is_quiet(plan, x, y))
-		s->simd->strip_list(pixels, NULL, NULL, 0);
+		s->simd->strip_list(pixels, NULL, NULL, 0, 0);
 	else
 		s->simd->strip_list(pixels, psr_zstack_row(s->picture->stack, y) + x,
-		                    s->picture->weight + (size_t)y * plan->width + x, left < STRIP ? left : STRIP);
+		                    s->picture->weight + (size_t)y * plan->width + x, left < STRIP ? left : STRIP,
+		                    plan->place_bits);
 	return pixels->n;
 }
 
@@ -131,7 +132,7 @@ uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint
 	const struct shading shading = { simd, plan, NULL };
 
 	strip->pixels = pixels;
-	simd->strip_list(pixels, word, NULL, n);
+	simd->strip_list(pixels, word, NULL, n, 0);
 	if (!pixels->n)
 		return 0;
 	simd->strip_find(pixels, &plan->view);

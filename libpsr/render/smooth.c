@@ -17,11 +17,12 @@ int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth)
 {
 	const size_t area = (size_t)plan->width * plan->height, depths = depth != NULL ? 0 : area * sizeof *depth;
 
-	smooth->storage = psr_grow_huge(smooth->storage, &smooth->storage_size, depths + 3 * area);
+	smooth->storage = psr_grow_huge(smooth->storage, &smooth->storage_size, depths + (plan->place_bits ? 4 : 3) * area);
 	if (smooth->storage == NULL)
 		return PSR_ERR_MEMORY;
 	smooth->depth = depth != NULL ? depth : smooth->storage;
 	smooth->rgb = (uint8_t *)smooth->storage + depths;
+	smooth->place = plan->place_bits ? smooth->rgb + 3 * area : NULL;
 	return PSR_OK;
 }
 
@@ -61,7 +62,9 @@ int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct 
 {
 	const float step = (float)(EDGE / (double)plan->focal);
 	struct smoothing smoothing = {
-		smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, plan->perspective, 1 / (1 + step), 0 },
+		smooth, simd, plan, { .from = smooth->rgb, .to = rgb, .depth = smooth->depth, .width = plan->width,
+		                      .height = plan->height, .perspective = plan->perspective, .scale = 1 / (1 + step),
+		                      .place = smooth->place },
 	};
 
 	if (!plan->perspective) {

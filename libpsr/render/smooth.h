@@ -9,12 +9,13 @@
 struct smooth {
 	uint8_t *rgb;
 	float *depth;
+	uint8_t *place; /* of plans with places, else NULL */
 	void *storage;
 	size_t storage_size;
 	_Atomic uint64_t n_edges; /* of the picture in progress */
 };
 
-/* Makes room for a picture, and for its depths if `depth` is NULL. MEMORY. */
+/* Makes room for a picture, its places, and its depths if `depth` is NULL. MEMORY. */
 int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth);
 void smooth_clear(struct smooth *smooth);
 

@@ -46,6 +46,7 @@ void warp_target_make(struct warp_target *t, const struct plan *plan, const stru
 	t->near_z = plan->near_z;
 	t->perspective = plan->perspective;
 	uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
+	t->place_bits = own != NULL ? 0 : plan->place_bits;
 	t->stride = own != NULL ? WARP_OWN_STRIDE : stack->width + stack->gap;
 	t->x0 = (int32_t)(tx * TILE_WIDTH);
 	t->y0 = (int32_t)(ty * TILE_HEIGHT);

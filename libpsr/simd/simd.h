@@ -54,6 +54,7 @@ struct simd {
 	fill_push_fn *fill_push;
 	fill_push_picture_fn *fill_push_picture;
 	fill_depths_fn *fill_depths;
+	smooth_places_fn *smooth_places;
 	smooth_fn *smooth;
 	average_light_fn *average_light;
 	average_around_fn *average_around;

@@ -82,8 +82,9 @@ struct strip_lights {
 };
 
 /* Lists the pixels of a piece of a row, at most STRIP, that have a word and a weight above 0 (NULL: any weight): sets
- * n, word, has_sample, x and id. */
-typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
+ * n, word, has_sample, x and id. place_bits: those of the words' stack. */
+typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n,
+                           unsigned place_bits);
 /* Finds and prefetches the attributes of at least one pixel, and with STRIP_TWO_SIDED and STRIP_BENT its block's
  * properties. Repeats the last pixel up to a multiple of STRIP_PADDING. Finding the next strip before reading this one
  * hides the latency of memory. */

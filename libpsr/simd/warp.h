@@ -91,6 +91,7 @@ struct warp_target {
 	float near_z;
 	int perspective;
 	uint64_t *word; /* the word of pixel (x0, y0); kernels leave the gaps between rows alone */
+	unsigned place_bits; /* of words, struct psr_zstack's; not 0 for blocks alone */
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
 	int32_t above, below; /* rows of the tile that are not the target's: differential points are counted there, too */

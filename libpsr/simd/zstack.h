@@ -10,7 +10,8 @@
 struct psr_zstack {
 	uint32_t width, height;
 	uint32_t gap;       /* words between a row's last and the next row's first */
-	uint64_t *word;     /* (width + gap) * height: bits of the float z' << 32 | sample id; PSR_WORD_EMPTY */
+	uint64_t *word;     /* (width + gap) * height: bits of the float z' << 32 | sample id; PSR_WORD_EMPTY; see place_bits */
+	unsigned place_bits; /* 0, or PSR_PLACE_BITS: ids are so far above where in their pixels samples lie */
 	uint32_t levels;    /* bit k: level[k] is in use, 1 <= k <= PSR_MAX_DEPTH_LEVEL */
 	struct {
 		float *z;       /* plain minimum of z' a cell, +inf where nothing is; a guard band of one cell on each side */
@@ -19,6 +20,9 @@ struct psr_zstack {
 	int exponent;       /* z' here is world z' * 2^-exponent: no stage knows an absolute length */
 };
 #define PSR_WORD_EMPTY UINT64_C(0x7f800000ffffffff)
+
+#define PSR_PLACE_BITS 4 /* quarters of a pixel: right, and four times those down */
+#define PSR_PLACE_NONE 16
 
 static inline uint64_t *psr_zstack_row(const struct psr_zstack *stack, uint32_t y)
 {

@@ -20,6 +20,7 @@ static void list_pixels(struct check *c, uint32_t n, int is_weighted, uint32_t e
 	struct strip_pixels *p = check_out(c, 1, sizeof *p);
 	uint64_t *word = check_in(c, n, sizeof *word);
 	uint16_t *weight = is_weighted ? check_in(c, n, sizeof *weight) : NULL;
+	const unsigned place_bits = check_one_in(c, 2) ? PSR_PLACE_BITS : 0;
 
 	for (uint32_t i = 0; i < n; i++) {
 		word[i] = (word[i] & UINT64_C(0x7fffffffffffffff)) % PSR_WORD_EMPTY;
@@ -30,7 +31,7 @@ static void list_pixels(struct check *c, uint32_t n, int is_weighted, uint32_t e
 	}
 	check_units(c, n);
 	while (check_next(c)) {
-		c->simd->strip_list(p, word, weight, n);
+		c->simd->strip_list(p, word, weight, n, place_bits);
 		if (c->is_bench)
 			continue;
 		memset(p->x + p->n, 0, sizeof p->x - p->n * sizeof *p->x);

@@ -121,6 +121,7 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 {
 	const struct bin_entry *entry = make_entries(c, p, n_entries, n_samples, step, numbers);
 
+	p->target.place_bits = check_one_in(c, 2) ? PSR_PLACE_BITS : 0;
 	while (check_next(c))
 		check_result(c, c->simd->warp(&p->target, entry, n_entries));
 }

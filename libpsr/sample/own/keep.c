@@ -9,6 +9,10 @@
 
 #define MOST_BLENDED 64
 
+/* Diameter of the circle that textures are averaged over, in distances of samples: pictures weigh samples by where they lie,
+ * which blurs them once more (decision 0159). */
+#define TEXTURE_DIAMETER 1.2
+
 /* Samples are drawn where their normals face the eye. A shading normal further than this from its face's, by a normal
  * map or smoothing at a crease, would open the surface in views along it: such a sample is bent, and faces by a normal
  * that is as near as this. */
@@ -106,7 +110,7 @@ static void look(const struct sampling *sampling, const struct surface_place *pl
 	uint64_t word;
 	float normal[3];
 
-	word = surface_look(sampling->surface, place, 1.4142135623730951 * sampling->ds, normal);
+	word = surface_look(sampling->surface, place, TEXTURE_DIAMETER * sampling->ds, normal);
 	to->attr = word | psr_direction_encode(normal);
 	to->traits |= v3f_dot(normal, n) < least ? PSR_BLOCK_BENT : 0;
 	surface_face(normal, facing);

@@ -36,6 +36,16 @@ static inline __m256i normals_of(const uint64_t *attr, __m256i valid)
 	return _mm256_and_si256(a, _mm256_set1_epi32(0x7fff));
 }
 
+/* Where in their pixels samples are that lie in the picture. */
+static inline __m256i quarters_of(__m256 u, __m256 v, __m256i pixel_u, __m256i pixel_v)
+{
+	const __m256 four = _mm256_set1_ps(4);
+	const __m256 right = _mm256_sub_ps(u, _mm256_cvtepi32_ps(pixel_u)), down = _mm256_sub_ps(v, _mm256_cvtepi32_ps(pixel_v));
+
+	return _mm256_or_si256(_mm256_cvttps_epi32(_mm256_mul_ps(right, four)),
+	                       _mm256_slli_epi32(_mm256_cvttps_epi32(_mm256_mul_ps(down, four)), 2));
+}
+
 /* The veils of a block's next samples, n or 8. */
 static inline __m256i veils_of(const struct veils *veils, int first, int n)
 {
@@ -90,9 +100,11 @@ static inline __attribute__((always_inline)) void list_block(struct words *words
 		k = _mm256_and_si256(k, _mm256_and_si256(within(pixel_u, t->x0, t->x1), within(pixel_v, t->y0, t->y1)));
 		const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
 		const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
+		__m256i low = _mm256_add_epi32(s, _mm256_set1_epi32((int)block->id));
+		if (t->place_bits)
+			low = _mm256_or_si256(_mm256_slli_epi32(low, PSR_PLACE_BITS), quarters_of(u, v, pixel_u, pixel_v));
 		const struct warped samples = {
-			_mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x),
-			_mm256_add_epi32(s, _mm256_set1_epi32((int)block->id)), _mm256_castps_si256(z1),
+			_mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x), low, _mm256_castps_si256(z1),
 			veils != NULL ? veils_of(veils, 8 * g, n - 8 * g) : _mm256_setzero_si256()
 		};
 		list_words(words, veils, k, &samples);

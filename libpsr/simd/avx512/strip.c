@@ -12,9 +12,11 @@ static inline uint64_t lowest(uint32_t n, uint32_t most)
 
 #define AHEAD (2 * STRIP) /* words: prefetch the strip after the next */
 
-void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
+void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels,
+                       unsigned place_bits)
 {
 	const __m512i empty = _mm512_set1_epi64((long long)PSR_WORD_EMPTY);
+	const __m128i by = _mm_cvtsi32_si128((int)place_bits);
 	__m512i x = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 	uint16_t *has_sample = (uint16_t *)p->has_sample;
 	uint32_t n = 0;
@@ -32,7 +34,7 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 			k = _mm256_mask_test_epi16_mask(k, _mm256_maskz_loadu_epi16(k, weight + first), _mm256_set1_epi16(-1));
 		k &= (__mmask16)(has_low | has_high << 8);
 		const __m512i low_id = _mm512_castsi256_si512(_mm512_cvtepi64_epi32(low));
-		const __m512i id = _mm512_inserti64x4(low_id, _mm512_cvtepi64_epi32(high), 1);
+		const __m512i id = _mm512_srl_epi32(_mm512_inserti64x4(low_id, _mm512_cvtepi64_epi32(high), 1), by);
 		_mm512_storeu_si512(p->id + n, _mm512_maskz_compress_epi32(k, id));
 		_mm256_storeu_si256((__m256i *)(p->x + n), _mm512_cvtepi32_epi16(_mm512_maskz_compress_epi32(k, x)));
 		has_sample[first / 16] = k;

@@ -29,6 +29,16 @@ static inline __m512i normals_of(const uint64_t *attr, __mmask16 k)
 	return _mm512_and_si512(_mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1), _mm512_set1_epi32(0x7fff));
 }
 
+/* Where in their pixels samples are that lie in the picture. */
+static inline __m512i quarters_of(__m512 u, __m512 v, __m512i pixel_u, __m512i pixel_v)
+{
+	const __m512 four = _mm512_set1_ps(4);
+	const __m512 right = _mm512_sub_ps(u, _mm512_cvtepi32_ps(pixel_u)), down = _mm512_sub_ps(v, _mm512_cvtepi32_ps(pixel_v));
+
+	return _mm512_or_si512(_mm512_cvttps_epi32(_mm512_mul_ps(right, four)),
+	                       _mm512_slli_epi32(_mm512_cvttps_epi32(_mm512_mul_ps(down, four)), 2));
+}
+
 /* The veils of the lanes of k: first .. first + 15 of a block. */
 static inline __m512i veils_of(const struct veils *veils, int first, __mmask16 k)
 {
@@ -85,7 +95,10 @@ static inline __attribute__((always_inline)) void list_block(struct words *words
 		const __m512i x = _mm512_sub_epi32(pixel_u, x0), y = _mm512_sub_epi32(pixel_v, y0);
 		k = _mm512_mask_cmplt_epu32_mask(k, x, width);
 		k = _mm512_mask_cmplt_epu32_mask(k, y, height);
-		const struct warped samples = { _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x), _mm512_add_epi32(s, id),
+		__m512i low = _mm512_add_epi32(s, id);
+		if (t->place_bits)
+			low = _mm512_or_si512(_mm512_slli_epi32(low, PSR_PLACE_BITS), quarters_of(u, v, pixel_u, pixel_v));
+		const struct warped samples = { _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x), low,
 			                            _mm512_castps_si512(z1),
 			                            veils != NULL ? veils_of(veils, i, k) : _mm512_setzero_si512() };
 		n_words = list_words(words, n_words, veils, is_mixed, k, samples);

@@ -46,6 +46,14 @@ static inline void find_pixel(struct place *p, const struct warp_target *t)
 	p->pixel_v = psr_floor_int(p->v);
 }
 
+/* Where in its pixel a sample is that lies in the picture. */
+static inline uint32_t quarters(const struct place *p)
+{
+	const float right = p->u - (float)p->pixel_u, down = p->v - (float)p->pixel_v;
+
+	return (uint32_t)(int32_t)(right * 4) | (uint32_t)(int32_t)(down * 4) << 2;
+}
+
 /* Returns whether it is in the tile. */
 static inline int lower(const struct warp_target *t, unsigned level, const struct place *p, uint32_t id)
 {
@@ -59,7 +67,8 @@ static inline int lower(const struct warp_target *t, unsigned level, const struc
 	}
 	if (!inside(p->pixel_u, p->pixel_v, t->x0, t->y0, t->x1, t->y1))
 		return 0;
-	const uint64_t word = (uint64_t)psr_bits_from_float(p->z) << 32 | id;
+	const uint32_t low = t->place_bits ? id << t->place_bits | quarters(p) : id;
+	const uint64_t word = (uint64_t)psr_bits_from_float(p->z) << 32 | low;
 	uint64_t *at = &t->word[(size_t)(p->pixel_v - t->y0) * t->stride + (size_t)(p->pixel_u - t->x0)];
 	*at = word < *at ? word : *at;
 	return 1;

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
+#include "simd/gaps.h"
 #include "simd/smooth.h"
 
 #define MOST_BEHIND 6 /* eighths: lines a pixel wide must not vanish */
@@ -9,12 +10,14 @@
 #define MARGIN SMOOTH_REACH
 #define ROWS (2 * MARGIN + 1)
 #define SMOOTH_RUN 16 /* pixels together: the fewer, the more runs are of one surface */
+#define SMOOTH_MEAN 256.0f /* of 128^2: what the mean of a surface's pixels weighs beside its samples */
 
 /* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane:
  * 1 / z' in perspective, else -z'. NaN outside of the picture: every comparison fails. */
 struct smooth_row {
 	float near[SMOOTH_WIDTH + 2 * MARGIN], limit[SMOOTH_WIDTH + 2 * MARGIN];
-	int32_t light[3][SMOOTH_WIDTH + 2 * MARGIN]; /* squared codes, close to linear; of the row and those beside it */
+	/* Squared codes, close to linear; of the row and those beside it. So small that sums are exact. */
+	float light[3][SMOOTH_WIDTH + 2 * MARGIN];
 	int32_t is_empty;
 };
 _Static_assert(SMOOTH_WIDTH % SMOOTH_RUN == 0, "runs may reach beyond the last pixel, not beyond a row");
@@ -62,13 +65,55 @@ static void load_light(struct smooth_row *row, const struct smooth_target *t, co
 	for (size_t i = in->first; i < in->end; i++) {
 		const int32_t r = code[3 * i], g = code[3 * i + 1], b = code[3 * i + 2];
 
-		row->light[0][i] = r * r;
-		row->light[1][i] = g * g;
-		row->light[2][i] = b * b;
+		row->light[0][i] = (float)(r * r);
+		row->light[1][i] = (float)(g * g);
+		row->light[2][i] = (float)(b * b);
 	}
 	for (int c = 0; c < 3; c++) {
 		memset(row->light[c], 0, in->first * sizeof *row->light[c]);
 		memset(row->light[c] + in->end, 0, (SMOOTH_WIDTH + 2 * MARGIN - in->end) * sizeof *row->light[c]);
+	}
+}
+
+/* What the samples of a row weigh, of 128: [k][i] of pixel i - 1 of the piece in the one before it (k 0), in its own and
+ * in the one behind it, by their columns and by their rows. */
+struct smooth_weights {
+	float across[3][SMOOTH_WIDTH + 2], down[3][SMOOTH_WIDTH + 2];
+	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN]; /* by run and a pixel more on each side */
+};
+
+/* A quadratic B-spline at the eighths 1, 3, 5 and 7 of a pixel: 3/4 - d^2 at a distance d of up to a half of the middle,
+ * (3/2 - d)^2 / 2 up to one and a half. */
+static inline void weigh_quarter(float *before, float *own, float *after, int32_t quarter, int32_t is_there)
+{
+	const int32_t from = 2 * quarter + 1, to = 7 - 2 * quarter, off = 2 * quarter - 3;
+
+	*before = (float)(to * to & is_there);
+	*own = (float)((96 - 2 * off * off) & is_there);
+	*after = (float)(from * from & is_there);
+}
+
+static void load_weights(struct smooth_weights *w, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
+{
+	const int is_inside = y >= 0 && y < (int64_t)t->height;
+	const size_t first = x0 == 0, left = t->width + 1 - x0, end = left < n + 2 ? left : n + 2;
+	uint8_t place[SMOOTH_WIDTH + 2];
+
+	memset(place, PSR_PLACE_NONE, sizeof place);
+	if (is_inside)
+		memcpy(place + first, t->place + (size_t)y * t->width + x0 + first - 1, end - first);
+	for (size_t i = 0; i < SMOOTH_WIDTH + 2; i++) {
+		const int32_t code = place[i], is_there = -(code < PSR_PLACE_NONE);
+
+		weigh_quarter(&w->across[0][i], &w->across[1][i], &w->across[2][i], code & 3, is_there);
+		weigh_quarter(&w->down[0][i], &w->down[1][i], &w->down[2][i], code >> 2 & 3, is_there);
+	}
+	for (size_t k = 0; k < SMOOTH_WIDTH / SMOOTH_RUN; k++) {
+		uint8_t least = PSR_PLACE_NONE;
+
+		for (size_t i = 0; i < SMOOTH_RUN + 2; i++)
+			least = place[k * SMOOTH_RUN + i] < least ? place[k * SMOOTH_RUN + i] : least;
+		w->has_any[k] = least < PSR_PLACE_NONE;
 	}
 }
 
@@ -77,14 +122,58 @@ struct smooth_masks {
 	int32_t above, below, left, right, corner[4];
 };
 
-static inline int32_t add_sides(const int32_t *a, const int32_t *o, const int32_t *b, const struct smooth_masks *m)
+static inline float masked(float value, int32_t mask)
 {
-	return ((a[0] & m->above) + (b[0] & m->below)) + ((o[-1] & m->left) + (o[1] & m->right));
+	return psr_float_from_bits(psr_bits_from_float(value) & (uint32_t)mask);
 }
 
-static inline int32_t add_corners(const int32_t *a, const int32_t *b, const struct smooth_masks *m)
+static inline float add_sides(const float *a, const float *o, const float *b, const struct smooth_masks *m)
 {
-	return ((a[-1] & m->corner[0]) + (a[1] & m->corner[1])) + ((b[-1] & m->corner[2]) + (b[1] & m->corner[3]));
+	return (masked(a[0], m->above) + masked(b[0], m->below)) + (masked(o[-1], m->left) + masked(o[1], m->right));
+}
+
+static inline float add_corners(const float *a, const float *b, const struct smooth_masks *m)
+{
+	return (masked(a[-1], m->corner[0]) + masked(a[1], m->corner[1]))
+	       + (masked(b[-1], m->corner[2]) + masked(b[1], m->corner[3]));
+}
+
+/* The weights of the samples in a pixel and around it, by row, and what to multiply eighths of all with. */
+struct smooth_shares {
+	float row[3][3], whole;
+};
+
+static inline float weight_of(const struct smooth_weights *w, int j, int i, size_t x)
+{
+	return w->across[1 - i][x + (size_t)(1 + i)] * w->down[1 - j][x + (size_t)(1 + i)];
+}
+
+/* Of pixel x; `w` points to the three rows around it. */
+static inline void find_shares_around(struct smooth_shares *s, const struct smooth_weights *const *w, size_t x,
+                                      const struct smooth_masks *m)
+{
+	const int32_t above[3] = { m->corner[0], m->above, m->corner[1] }, beside[3] = { m->left, -1, m->right };
+	const int32_t below[3] = { m->corner[2], m->below, m->corner[3] };
+	float all = 0;
+
+	for (int i = -1; i <= 1; i++) {
+		s->row[0][1 + i] = masked(weight_of(w[0], -1, i, x), above[1 + i]);
+		s->row[1][1 + i] = masked(weight_of(w[1], 0, i, x), beside[1 + i]);
+		s->row[2][1 + i] = masked(weight_of(w[2], 1, i, x), below[1 + i]);
+	}
+	for (int j = 0; j < 3; j++)
+		all += (s->row[j][0] + s->row[j][1]) + s->row[j][2];
+	s->whole = 8 / (all + SMOOTH_MEAN);
+}
+
+/* Eight times the light of samples, and of the mean of which `mean` is eight times as much. */
+static inline float add_shares(const float *a, const float *o, const float *b, const struct smooth_shares *s, float mean)
+{
+	const float above = (a[-1] * s->row[0][0] + a[0] * s->row[0][1]) + a[1] * s->row[0][2];
+	const float beside = (o[-1] * s->row[1][0] + o[0] * s->row[1][1]) + o[1] * s->row[1][2];
+	const float below = (b[-1] * s->row[2][0] + b[0] * s->row[2][1]) + b[1] * s->row[2][2];
+
+	return (((above + beside) + below) + mean * (SMOOTH_MEAN / 8)) * s->whole;
 }
 
 static inline int32_t smooth_code(float light)
@@ -115,12 +204,31 @@ static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t 
                                  const struct smooth_row *const *row)
 {
 	for (int c = 0; c < 3; c++) {
-		const int32_t *a = row[-1]->light[c] + MARGIN + x, *o = row[0]->light[c] + MARGIN + x;
-		const int32_t *b = row[1]->light[c] + MARGIN + x;
+		const float *a = row[-1]->light[c] + MARGIN + x, *o = row[0]->light[c] + MARGIN + x;
+		const float *b = row[1]->light[c] + MARGIN + x;
 
 		for (ptrdiff_t i = 0; i < SMOOTH_RUN; i++)
-			code[c][x + (size_t)i] =
-				smooth_code((float)(4 * o[i] + ((a[i] + b[i]) + (o[i - 1] + o[i + 1]))) * (1 / 8.0f));
+			code[c][x + (size_t)i] = smooth_code((4 * o[i] + ((a[i] + b[i]) + (o[i - 1] + o[i + 1]))) * (1 / 8.0f));
+	}
+}
+
+/* The same with samples. */
+static inline void smooth_samples(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row,
+                                  const struct smooth_weights *const *weights)
+{
+	static const struct smooth_masks all = { -1, -1, -1, -1, { -1, -1, -1, -1 } };
+
+	for (size_t k = 0; k < SMOOTH_RUN; k++) {
+		const size_t i = x + k + MARGIN;
+		struct smooth_shares shares;
+
+		find_shares_around(&shares, weights, x + k, &all);
+		for (int c = 0; c < 3; c++) {
+			const float *a = row[-1]->light[c] + i, *o = row[0]->light[c] + i, *b = row[1]->light[c] + i;
+			const float mean = 4 * o[0] + ((a[0] + b[0]) + (o[-1] + o[1]));
+
+			code[c][x + k] = smooth_code(add_shares(a, o, b, &shares, mean) * (1 / 8.0f));
+		}
 	}
 }
 
@@ -149,9 +257,16 @@ static inline int32_t is_same(float fall, float rise, float near, float limit, f
 	return -((other >= limit - fall) & (near >= others_limit - rise));
 }
 
-/* Returns how many pixels have a neighbour behind. */
-static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
-                                    const struct smooth_row *const *row)
+/* The same of a step aslant, along a row and a column, from a pixel above or below its limits. */
+static inline int32_t is_same_aslant(float limit, float rise, float up, float near, float other, float others_limit)
+{
+	return -((other >= limit) & (near >= others_limit - rise - up));
+}
+
+/* Returns how many pixels have a neighbour behind. `weights` is NULL, or of the three rows in the middle. */
+static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
+                                                                   const struct smooth_row *const *row,
+                                                                   const struct smooth_weights *const *weights)
 {
 	const size_t first = x + MARGIN;
 	const struct smooth_row *up = row[-1], *own = row[0], *down = row[1];
@@ -181,7 +296,10 @@ static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size
 			is_same(below, below_up, near, limit, down->near[i], down->limit[i]),
 			is_same(left, left_up, near, limit, own->near[i - 1], own->limit[i - 1]),
 			is_same(right, right_up, near, limit, own->near[i + 1], own->limit[i + 1]),
-			{ 0 },
+			{ is_same_aslant(high - left, above_up, left_up, near, up->near[i - 1], up->limit[i - 1]),
+			  is_same_aslant(high - right, above_up, right_up, near, up->near[i + 1], up->limit[i + 1]),
+			  is_same_aslant(low - left, below_up, left_up, near, down->near[i - 1], down->limit[i - 1]),
+			  is_same_aslant(low - right, below_up, right_up, near, down->near[i + 1], down->limit[i + 1]) },
 		};
 		const int32_t sides = behind.above + behind.below + behind.left + behind.right;
 		const int32_t corners = behind.corner[0] + behind.corner[1] + behind.corner[2] + behind.corner[3];
@@ -190,10 +308,15 @@ static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size
 		const float share = (float)(8 - through) * (1 / 64.0f);
 		const float rest = (float)through / (float)(8 * (edges ? edges : 1));
 
+		struct smooth_shares shares;
+
+		if (weights != NULL)
+			find_shares_around(&shares, weights, x + k, &same);
 		for (int c = 0; c < 3; c++) {
-			const int32_t *a = up->light[c] + i, *o = own->light[c] + i, *b = down->light[c] + i;
-			const float front = (float)((4 + others) * o[0] + add_sides(a, o, b, &same));
-			const float back = (float)(2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind));
+			const float *a = up->light[c] + i, *o = own->light[c] + i, *b = down->light[c] + i;
+			const float mean = (float)(4 + others) * o[0] + add_sides(a, o, b, &same);
+			const float front = weights != NULL ? add_shares(a, o, b, &shares, mean) : mean;
+			const float back = 2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind);
 
 			code[c][x + k] = smooth_code(front * share + back * rest);
 		}
@@ -202,11 +325,41 @@ static inline uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size
 	return (uint32_t)n_edges;
 }
 
+static void smooth_places(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
+{
+	for (uint32_t x = 0; x < n; x++) {
+		const int is_there = word[x] != PSR_WORD_EMPTY && weight[x] >= GAPS_WHOLE / 2;
+
+		place[x] = is_there ? (uint8_t)(word[x] & ((1 << PSR_PLACE_BITS) - 1)) : PSR_PLACE_NONE;
+	}
+}
+
+/* Smooths a run. `weights`: NULL, or of the three rows in the middle. */
+static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row,
+                           const struct smooth_weights *const *weights)
+{
+	const size_t k = x / SMOOTH_RUN;
+	const int is_inside = is_smooth_surface(row, x + MARGIN);
+
+	if (weights != NULL && (weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k])) {
+		if (!is_inside)
+			return smooth_edges(code, x, row, weights);
+		smooth_samples(code, x, row, weights);
+	} else {
+		if (!is_inside)
+			return smooth_edges(code, x, row, NULL);
+		smooth_inside(code, x, row);
+	}
+	return 0;
+}
+
 static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	const uint32_t n = x1 - x0;
 	struct smooth_row rows[ROWS];
 	const struct smooth_row *row[ROWS];
+	struct smooth_weights weights[3];
+	const struct smooth_weights *around[3];
 	int32_t code[3][SMOOTH_WIDTH];
 	uint32_t n_edges = 0;
 
@@ -217,22 +370,22 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 		load_nearness(&rows[(y + MARGIN) % ROWS], t, &in);
 		if (own + 1 >= (int64_t)y0 - 1)
 			load_light(&rows[(own + 1 + MARGIN) % ROWS], t, &next);
+		if (t->place != NULL && own + 1 >= (int64_t)y0 - 1)
+			load_weights(&weights[(own + 2) % 3], t, x0, n, own + 1);
 		if (own < (int64_t)y0)
 			continue;
 		for (int64_t k = 0; k < ROWS; k++)
 			row[k] = &rows[(own + k) % ROWS];
+		for (int64_t k = 0; k < 3; k++)
+			around[k] = &weights[(own + k) % 3];
 		uint8_t *to = t->to + 3 * ((size_t)own * t->width + x0);
 
 		if (row[MARGIN]->is_empty) {
 			memcpy(to, t->from + 3 * ((size_t)own * t->width + x0), 3 * (size_t)n);
 			continue;
 		}
-		for (uint32_t x = 0; x < n; x += SMOOTH_RUN) {
-			if (is_smooth_surface(row + MARGIN, x + MARGIN))
-				smooth_inside(code, x, row + MARGIN);
-			else
-				n_edges += smooth_edges(code, x, row + MARGIN);
-		}
+		for (uint32_t x = 0; x < n; x += SMOOTH_RUN)
+			n_edges += smooth_run(code, x, row + MARGIN, t->place != NULL ? around : NULL);
 		for (size_t i = 0; i < n; i++)
 			for (size_t c = 0; c < 3; c++)
 				to[3 * i + c] = (uint8_t)code[c][i];

@@ -7,7 +7,8 @@
 #include "strip_parts.h"
 #include "strip_write.h"
 
-static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
+static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels,
+                              unsigned place_bits)
 {
 	uint32_t n = 0;
 
@@ -16,7 +17,7 @@ static inline void strip_list(struct strip_pixels *p, const uint64_t *word, cons
 		const uint32_t has_sample = word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
 
 		p->x[n] = (uint16_t)x;
-		p->id[n] = (uint32_t)word[x];
+		p->id[n] = (uint32_t)word[x] >> place_bits;
 		p->has_sample[x / 32] |= has_sample << x % 32;
 		n += has_sample;
 	}

@@ -51,6 +51,7 @@
 	.fill_push = KERNEL(fill_push),                \
 	.fill_push_picture = KERNEL(fill_push_picture),\
 	.fill_depths = fill_depths,                    \
+	.smooth_places = smooth_places,                \
 	.smooth = smooth,                              \
 	.average_light = average_light,                \
 	.average_around = average_around,              \

@@ -16,12 +16,14 @@
 
 #define SIDE 7
 
-/* A picture of SIDE x SIDE pixels: '#' white and near, '.' black and `step` behind, ' ' black and nothing. */
-static uint32_t smooth(uint8_t light[SIDE][SIDE], const char *const *row, float step)
+/* A picture of SIDE x SIDE pixels: '#' white and near, '.' black and `step` behind, ' ' black and nothing; NULL: nobody
+ * knows places. */
+static uint32_t smooth_placed(uint8_t light[SIDE][SIDE], const char *const *row, float step, const uint8_t *place)
 {
 	uint8_t from[SIDE][SIDE][3], to[SIDE][SIDE][3];
 	float depth[SIDE][SIDE];
-	const struct smooth_target target = { from[0][0], to[0][0], depth[0], SIDE, SIDE, 0, 1, 0.03f };
+	const struct smooth_target target = { .from = from[0][0], .to = to[0][0], .depth = depth[0], .width = SIDE,
+		                                  .height = SIDE, .scale = 1, .offset = 0.03f, .place = place };
 	for (int y = 0; y < SIDE; y++)
 		for (int x = 0; x < SIDE; x++) {
 			memset(from[y][x], row[y][x] == '#' ? 255 : 0, 3);
@@ -32,6 +34,11 @@ static uint32_t smooth(uint8_t light[SIDE][SIDE], const char *const *row, float 
 		for (int x = 0; x < SIDE; x++)
 			light[y][x] = to[y][x][1];
 	return n_edges;
+}
+
+static uint32_t smooth(uint8_t light[SIDE][SIDE], const char *const *row, float step)
+{
+	return smooth_placed(light, row, step, NULL);
 }
 
 /* The code whose square is this share of white's. */
@@ -92,6 +99,63 @@ static void neighbours_of_a_surface_are_averaged(void **state)
 	assert_int_equal(light[3][3], 0);
 	assert_int_equal(light[3][2], white(6 / 8.0));
 	assert_int_equal(light[2][2], white(7 / 8.0));
+}
+
+/* A quadratic B-spline, in pixels. */
+static double spline(double d)
+{
+	const double from = fabs(d), rest = 1.5 - from;
+
+	return from <= 0.5 ? 0.75 - d * d : rest > 0 ? rest * rest / 2 : 0;
+}
+
+/* All samples lie alike in their pixels, so that rows tell nothing: a column counts as the spline says, at the middle of
+ * a quarter, and to a 64th as without places. */
+static void samples_count_by_where_they_lie(void **state)
+{
+	static const char *const row[SIDE] = { "...#...", "...#...", "...#...", "...#...", "...#...", "...#...", "...#..." };
+	uint8_t light[SIDE][SIDE], place[SIDE * SIDE];
+
+	(void)state;
+	for (int code = 0; code < PSR_PLACE_NONE; code++) {
+		memset(place, code, sizeof place);
+		assert_int_equal(smooth_placed(light, row, 0, place), 0);
+		for (int x = 1; x < SIDE - 1; x++) {
+			const double mean = x == 3 ? 6 / 8.0 : x == 2 || x == 4 ? 1 / 8.0 : 0;
+			const double share = spline(3 + (code % 4 + 0.5) / 4 - (x + 0.5));
+
+			for (int y = 1; y < SIDE - 1; y++)
+				assert_int_equal(light[y][x], white((share + mean / 64) / (1 + 1 / 64.0)));
+		}
+	}
+}
+
+static void samples_of_what_is_behind_count_for_nothing(void **state)
+{
+	static const char *const row[SIDE] = { "###....", "###....", "###....", "###....", "###....", "###....", "###...." };
+	uint8_t light[SIDE][SIDE], with[SIDE][SIDE], place[SIDE * SIDE];
+
+	(void)state;
+	for (int i = 0; i < SIDE * SIDE; i++)
+		place[i] = (uint8_t)(i * 7 % PSR_PLACE_NONE);
+	smooth(light, row, 0.1f);
+	assert_int_equal(smooth_placed(with, row, 0.1f, place), SIDE);
+	assert_memory_equal(with, light, sizeof light);
+}
+
+static void without_samples_nothing_changes(void **state)
+{
+	static const char *const row[SIDE] = { " #  ...", "#.#####", "##.. ##", "###.###", "#   ###", "#######", "...####" };
+	uint8_t light[SIDE][SIDE], with[SIDE][SIDE], place[SIDE * SIDE];
+
+	(void)state;
+	memset(place, PSR_PLACE_NONE, sizeof place);
+	for (int is_far = 0; is_far < 2; is_far++) {
+		const float step = is_far ? 0.1f : 0.02f;
+
+		assert_int_equal(smooth(light, row, step), smooth_placed(with, row, step, place));
+		assert_memory_equal(with, light, sizeof light);
+	}
 }
 
 struct drawn {
@@ -286,6 +350,9 @@ int main(void)
 		cmocka_unit_test(an_edge_lets_half_of_what_is_behind_through),
 		cmocka_unit_test(corners_and_lines_keep_a_quarter_at_least),
 		cmocka_unit_test(neighbours_of_a_surface_are_averaged),
+		cmocka_unit_test(samples_count_by_where_they_lie),
+		cmocka_unit_test(samples_of_what_is_behind_count_for_nothing),
+		cmocka_unit_test(without_samples_nothing_changes),
 		cmocka_unit_test(only_color_changes_and_alike_for_any_threads_and_planes),
 		cmocka_unit_test(the_rim_of_a_sphere_is_three_times_as_true),
 		cmocka_unit_test(a_grazed_plane_is_one_surface),

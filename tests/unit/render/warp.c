@@ -11,6 +11,8 @@
 #include "render/cull.h"
 #include "render/zbuffer.h"
 
+#define SIDE 160
+
 static struct psr_model *wheel;
 
 static int open_model(void **state)
@@ -128,11 +130,65 @@ static void rows_of_words_are_apart(void **state)
 	}
 }
 
+/* A picture's words into `word`, row by row; its samples are of the levels that are a pixel apart or less where the
+ * picture has SIDE pixels a row. */
+static void warp_words(uint64_t *word, const struct psr_scene *scene, uint32_t finer, enum psr_smooth smooth)
+{
+	const uint32_t width = finer * SIDE, height = width / 4 * 3;
+	struct render_settings settings;
+	struct psr_renderer *renderer;
+	struct psr_zstack *stack;
+
+	render_settings_default(&settings, width, height);
+	settings.cull_tests = 0;
+	settings.spacing_px = finer;
+	settings.smooth = smooth;
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(renderer_warp(renderer, scene, &settings, NULL, &stack, NULL), PSR_OK);
+	assert_int_equal(stack->place_bits, smooth ? PSR_PLACE_BITS : 0);
+	for (uint32_t y = 0; y < height; y++)
+		memcpy(word + (size_t)y * width, psr_zstack_row(stack, y), width * sizeof *word);
+	psr_renderer_destroy(renderer);
+}
+
+/* Lengths in pixels are four times as great there, exactly. What is nearest in a pixel is so in a part of it. */
+static void places_are_pixels_of_a_picture_four_times_as_large(void **state)
+{
+	const struct psr_model_info *info = psr_model_info(wheel);
+	struct psr_instance instance = { .model = wheel, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	struct psr_scene scene = { .instance = &instance, .n_instances = 1 };
+	uint64_t *word = malloc(SIDE * (SIDE / 4 * 3) * sizeof *word), *finer = malloc(16 * SIDE * (SIDE / 4 * 3) * sizeof *finer);
+	uint32_t n = 0;
+
+	(void)state;
+	for (int is_ortho = 0; is_ortho < 2; is_ortho++) {
+		psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, 0.6, 4 / 3.0);
+		scene.camera.kind = is_ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
+		scene.camera.ortho_height = 3;
+		warp_words(word, &scene, 1, PSR_SMOOTH_EDGES);
+		warp_words(finer, &scene, 4, PSR_SMOOTH_NONE);
+		for (uint32_t y = 0; y < SIDE / 4 * 3; y++)
+			for (uint32_t x = 0; x < SIDE; x++) {
+				const uint64_t own = word[y * SIDE + x], place = own & (PSR_PLACE_NONE - 1);
+
+				if (own == PSR_WORD_EMPTY)
+					continue;
+				const uint64_t there = finer[(4 * y + place / 4) * 4 * SIDE + 4 * x + place % 4];
+				assert_int_equal(there, (own >> 32) << 32 | (uint32_t)own >> PSR_PLACE_BITS);
+				n++;
+			}
+	}
+	assert_true(n > 1000);
+	free(word);
+	free(finer);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(tiles_and_turns_give_what_all_samples_give),
 		cmocka_unit_test(rows_of_words_are_apart),
+		cmocka_unit_test(places_are_pixels_of_a_picture_four_times_as_large),
 	};
 
 	return cmocka_run_group_tests(tests, open_model, close_model);
