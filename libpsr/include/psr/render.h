@@ -27,7 +27,8 @@ struct psr_settings {
 	double spacing_px;
 	/* EDGES: anti-aliasing in one pass ([G] 9.1.1), for a third of the frame's time. Blends a pixel at an edge with the
 	 * surface behind it, by how many of its eight neighbours belong to the near surface, and any other pixel with
-	 * samples of its own surface around it, by where they lie. Only colour changes. NONE by default; passes above 0 ignore it. */
+	 * samples of its own surface around it, by where they lie. Only colour changes. NONE by default; passes above 0
+	 * ignore it. */
 	enum psr_smooth smooth;
 	/* Pass p > 0 draws 2^p x 2^p sub-pixels a pixel, and gives each pixel the mean of their light and the least of
 	 * their depths. It draws colour and depth only, takes about 4^p times as long, and needs no other pass before
