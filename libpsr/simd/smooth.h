@@ -24,8 +24,8 @@ struct smooth_target {
 	const uint8_t *place;
 };
 
-/* The places of a row of words with PSR_PLACE_BITS: PSR_PLACE_NONE of those that are empty or by less than half of the
- * pixel's weight. */
+/* The places of a row of words with PSR_PLACE_BITS; PSR_PLACE_NONE where a word is empty, or its pixel's weight below a
+ * half. */
 typedef void smooth_places_fn(uint8_t *place, const uint64_t *word, const uint16_t *weight, uint32_t n);
 
 /* Smooths the pixels x0 <= x < x1, y0 <= y < y1, x1 at most SMOOTH_WIDTH more. Within a surface a pixel p becomes (4 p
@@ -34,9 +34,9 @@ typedef void smooth_places_fn(uint8_t *place, const uint64_t *word, const uint16
  * side neighbours count twice in the mean. Neighbours in front do not count. Means are of squared codes. Returns how
  * many pixels have a neighbour behind.
  *
- * With places, p becomes the mean of samples of its surface in the pixel and the eight around it, weighed by a quadratic
- * B-spline of how far they lie from the pixel's middle along each axis; a 64th of a whole one's weight is the mean above,
- * which is all there is where no sample is near. */
+ * With places, p becomes the mean of samples of its surface in the pixel and the eight around it, weighed by a
+ * quadratic B-spline of how far they lie from the pixel's middle along each axis; a 64th of a whole one's weight is the
+ * mean above, which is all there is where no sample is near. */
 typedef uint32_t smooth_fn(const struct smooth_target *target, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1);
 
 #endif

@@ -10,7 +10,7 @@
 struct psr_zstack {
 	uint32_t width, height;
 	uint32_t gap;       /* words between a row's last and the next row's first */
-	uint64_t *word;     /* (width + gap) * height: bits of the float z' << 32 | sample id; PSR_WORD_EMPTY; see place_bits */
+	uint64_t *word;     /* (width + gap) * height: bits of the float z' << 32 | sample id; PSR_WORD_EMPTY */
 	unsigned place_bits; /* 0, or PSR_PLACE_BITS: ids are so far above where in their pixels samples lie */
 	uint32_t levels;    /* bit k: level[k] is in use, 1 <= k <= PSR_MAX_DEPTH_LEVEL */
 	struct {

@@ -24,7 +24,8 @@ static void smooth(struct check *c, uint32_t width, uint32_t height, uint32_t x0
 			depth[i] = INFINITY;
 	const struct smooth_target target = {
 		.from = from, .to = to, .depth = depth, .width = width, .height = height,
-		.place = is_placed ? place : NULL, .perspective = check_one_in(c, 2), .scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 0.9, 1), .offset = (float)check_real(c, 0, 0.1),
+		.place = is_placed ? place : NULL, .perspective = check_one_in(c, 2),
+		.scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 0.9, 1), .offset = (float)check_real(c, 0, 0.1),
 	};
 	check_units(c, (uint64_t)n * rows);
 	while (check_next(c))
@@ -35,7 +36,8 @@ static void a_piece(struct check *c, int is_any)
 {
 	const uint32_t n = 1 + check_below(c, SMOOTH_WIDTH), rows = 1 + check_below(c, GAPS_BRICK);
 	const uint32_t x0 = check_below(c, 3), y0 = check_below(c, 3);
-	smooth(c, x0 + n + check_below(c, 3), y0 + rows + check_below(c, 3), x0, n, y0, rows, is_any, (int)check_below(c, 2));
+	const int is_placed = (int)check_below(c, 2);
+	smooth(c, x0 + n + check_below(c, 3), y0 + rows + check_below(c, 3), x0, n, y0, rows, is_any, is_placed);
 }
 
 static void random_pieces(struct check *c)

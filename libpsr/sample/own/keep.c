@@ -9,8 +9,8 @@
 
 #define MOST_BLENDED 64
 
-/* Diameter of the circle that textures are averaged over, in distances of samples: pictures weigh samples by where they lie,
- * which blurs them once more (decision 0159). */
+/* Diameter of the circle that textures are averaged over, in distances of samples: pictures weigh samples by where they
+ * lie, which blurs them once more (decision 0159). */
 #define TEXTURE_DIAMETER 1.2
 
 /* Samples are drawn where their normals face the eye. A shading normal further than this from its face's, by a normal

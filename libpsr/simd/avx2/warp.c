@@ -40,7 +40,8 @@ static inline __m256i normals_of(const uint64_t *attr, __m256i valid)
 static inline __m256i quarters_of(__m256 u, __m256 v, __m256i pixel_u, __m256i pixel_v)
 {
 	const __m256 four = _mm256_set1_ps(4);
-	const __m256 right = _mm256_sub_ps(u, _mm256_cvtepi32_ps(pixel_u)), down = _mm256_sub_ps(v, _mm256_cvtepi32_ps(pixel_v));
+	const __m256 right = _mm256_sub_ps(u, _mm256_cvtepi32_ps(pixel_u));
+	const __m256 down = _mm256_sub_ps(v, _mm256_cvtepi32_ps(pixel_v));
 
 	return _mm256_or_si256(_mm256_cvttps_epi32(_mm256_mul_ps(right, four)),
 	                       _mm256_slli_epi32(_mm256_cvttps_epi32(_mm256_mul_ps(down, four)), 2));

@@ -33,7 +33,8 @@ static inline __m512i normals_of(const uint64_t *attr, __mmask16 k)
 static inline __m512i quarters_of(__m512 u, __m512 v, __m512i pixel_u, __m512i pixel_v)
 {
 	const __m512 four = _mm512_set1_ps(4);
-	const __m512 right = _mm512_sub_ps(u, _mm512_cvtepi32_ps(pixel_u)), down = _mm512_sub_ps(v, _mm512_cvtepi32_ps(pixel_v));
+	const __m512 right = _mm512_sub_ps(u, _mm512_cvtepi32_ps(pixel_u));
+	const __m512 down = _mm512_sub_ps(v, _mm512_cvtepi32_ps(pixel_v));
 
 	return _mm512_or_si512(_mm512_cvttps_epi32(_mm512_mul_ps(right, four)),
 	                       _mm512_slli_epi32(_mm512_cvttps_epi32(_mm512_mul_ps(down, four)), 2));

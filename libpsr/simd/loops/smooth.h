@@ -75,15 +75,15 @@ static void load_light(struct smooth_row *row, const struct smooth_target *t, co
 	}
 }
 
-/* What the samples of a row weigh, of 128: [k][i] of pixel i - 1 of the piece in the one before it (k 0), in its own and
- * in the one behind it, by their columns and by their rows. */
+/* What the samples of a row weigh, of 128: [k][i] of pixel i - 1 of the piece in the one before it (k 0), in its own
+ * and in the one behind it, by their columns and by their rows. */
 struct smooth_weights {
 	float across[3][SMOOTH_WIDTH + 2], down[3][SMOOTH_WIDTH + 2];
 	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN]; /* by run and a pixel more on each side */
 };
 
-/* A quadratic B-spline at the eighths 1, 3, 5 and 7 of a pixel: 3/4 - d^2 at a distance d of up to a half of the middle,
- * (3/2 - d)^2 / 2 up to one and a half. */
+/* A quadratic B-spline at the eighths 1, 3, 5 and 7 of a pixel: 3/4 - d^2 at a distance d of up to a half of the
+ * middle, (3/2 - d)^2 / 2 up to one and a half. */
 static inline void weigh_quarter(float *before, float *own, float *after, int32_t quarter, int32_t is_there)
 {
 	const int32_t from = 2 * quarter + 1, to = 7 - 2 * quarter, off = 2 * quarter - 3;
@@ -167,7 +167,8 @@ static inline void find_shares_around(struct smooth_shares *s, const struct smoo
 }
 
 /* Eight times the light of samples, and of the mean of which `mean` is eight times as much. */
-static inline float add_shares(const float *a, const float *o, const float *b, const struct smooth_shares *s, float mean)
+static inline float add_shares(const float *a, const float *o, const float *b, const struct smooth_shares *s,
+                               float mean)
 {
 	const float above = (a[-1] * s->row[0][0] + a[0] * s->row[0][1]) + a[1] * s->row[0][2];
 	const float beside = (o[-1] * s->row[1][0] + o[0] * s->row[1][1]) + o[1] * s->row[1][2];
@@ -197,6 +198,18 @@ static inline int32_t is_smooth_surface(const struct smooth_row *const *row, siz
 		          & (near >= up_limit[i]) & (near >= down_limit[i]) & (near >= own_limit[i - 1])
 		          & (near >= own_limit[i + 1]);
 	}
+	return is_one;
+}
+
+/* Whether none of the others lies before the run. */
+static inline int32_t are_corners_same(const struct smooth_row *const *row, size_t first)
+{
+	const float *up_limit = row[-1]->limit, *own = row[0]->near, *down_limit = row[1]->limit;
+	int32_t is_one = 1;
+
+	for (size_t i = first; i < first + SMOOTH_RUN; i++)
+		is_one &= (own[i] >= up_limit[i - 1]) & (own[i] >= up_limit[i + 1]) & (own[i] >= down_limit[i - 1])
+		          & (own[i] >= down_limit[i + 1]);
 	return is_one;
 }
 
@@ -342,7 +355,7 @@ static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, con
 	const int is_inside = is_smooth_surface(row, x + MARGIN);
 
 	if (weights != NULL && (weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k])) {
-		if (!is_inside)
+		if (!is_inside || !are_corners_same(row, x + MARGIN))
 			return smooth_edges(code, x, row, weights);
 		smooth_samples(code, x, row, weights);
 	} else {

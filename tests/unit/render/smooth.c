@@ -109,11 +109,12 @@ static double spline(double d)
 	return from <= 0.5 ? 0.75 - d * d : rest > 0 ? rest * rest / 2 : 0;
 }
 
-/* All samples lie alike in their pixels, so that rows tell nothing: a column counts as the spline says, at the middle of
- * a quarter, and to a 64th as without places. */
+/* All samples lie alike in their pixels, so that rows tell nothing: a column counts as the spline says, at the middle
+ * of a quarter, and to a 64th as without places. */
 static void samples_count_by_where_they_lie(void **state)
 {
-	static const char *const row[SIDE] = { "...#...", "...#...", "...#...", "...#...", "...#...", "...#...", "...#..." };
+	static const char *const row[SIDE] = { "...#...", "...#...", "...#...", "...#...",
+		                                   "...#...", "...#...", "...#..." };
 	uint8_t light[SIDE][SIDE], place[SIDE * SIDE];
 
 	(void)state;
@@ -132,7 +133,8 @@ static void samples_count_by_where_they_lie(void **state)
 
 static void samples_of_what_is_behind_count_for_nothing(void **state)
 {
-	static const char *const row[SIDE] = { "###....", "###....", "###....", "###....", "###....", "###....", "###...." };
+	static const char *const row[SIDE] = { "###....", "###....", "###....", "###....",
+		                                   "###....", "###....", "###...." };
 	uint8_t light[SIDE][SIDE], with[SIDE][SIDE], place[SIDE * SIDE];
 
 	(void)state;
@@ -145,7 +147,8 @@ static void samples_of_what_is_behind_count_for_nothing(void **state)
 
 static void without_samples_nothing_changes(void **state)
 {
-	static const char *const row[SIDE] = { " #  ...", "#.#####", "##.. ##", "###.###", "#   ###", "#######", "...####" };
+	static const char *const row[SIDE] = { " #  ...", "#.#####", "##.. ##", "###.###",
+		                                   "#   ###", "#######", "...####" };
 	uint8_t light[SIDE][SIDE], with[SIDE][SIDE], place[SIDE * SIDE];
 
 	(void)state;

@@ -157,7 +157,8 @@ static void places_are_pixels_of_a_picture_four_times_as_large(void **state)
 	const struct psr_model_info *info = psr_model_info(wheel);
 	struct psr_instance instance = { .model = wheel, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1 };
-	uint64_t *word = malloc(SIDE * (SIDE / 4 * 3) * sizeof *word), *finer = malloc(16 * SIDE * (SIDE / 4 * 3) * sizeof *finer);
+	const size_t area = SIDE * (SIDE / 4 * 3);
+	uint64_t *word = malloc(area * sizeof *word), *finer = malloc(16 * area * sizeof *finer);
 	uint32_t n = 0;
 
 	(void)state;
