@@ -88,10 +88,10 @@ static void descend(const struct walk *walk, int depth, uint32_t node, uint64_t 
 		return;
 	}
 	for (int k = 0; k < OCTREE_NEAR; k++) {
-		const uint32_t at = near->at[k];
+		const uint32_t is_there = -(uint32_t)(near->at[k] != OCTREE_NONE), at = near->at[k] & is_there; /* no branch */
 
-		family.code[k] = at != OCTREE_NONE ? level->code[at] : 0;
-		family.first[k] = at != OCTREE_NONE ? level->first[at] : 0;
+		family.code[k] = (uint8_t)(level->code[at] & is_there);
+		family.first[k] = level->first[at] & is_there;
 	}
 	child = family.first[OCTREE_SELF];
 #pragma GCC unroll 8
