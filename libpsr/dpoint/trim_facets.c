@@ -8,6 +8,7 @@
 
 struct corner {
 	double uv[2], at[3];
+	uint32_t cell[2];
 };
 
 struct dividing {
@@ -18,23 +19,27 @@ struct dividing {
 
 static void find_place(struct corner *c, const struct dividing *d)
 {
-	uint32_t cell[2];
-
-	trim_find_cell(cell, d->grid, c->uv);
-	trim_place(c->at, d->grid, cell, c->uv, d->options);
+	trim_find_cell(c->cell, d->grid, c->uv);
+	trim_place(c->at, d->grid, c->cell, c->uv, d->options);
 }
 
-/* Finds the middle of a side. Returns how far it is from the chord. */
+/* Finds the middle of a side. Returns how far it is from the chord, or 0 without looking where normals turn too little for
+ * what is allowed: an arc of a length and a turn is off its chord by an eighth of their product, its chord is at most 4.3 %
+ * shorter if it turns by 1, and normals turn by as much as the grid's cells let them. */
 static double find_middle(struct corner *middle, const struct corner *a, const struct corner *b, const struct dividing *d)
 {
-	double along[3], away[3], square, t;
+	double along[3], away[3], square, t, turn = 0;
 
+	v3d_sub(along, b->at, a->at);
+	square = v3d_dot(along, along);
+	for (int k = 0; k < 2; k++)
+		turn += (fabs((double)a->cell[k] - b->cell[k]) + 1) * d->options->turn;
+	if (turn <= 1 && 1.043 * turn * sqrt(square) / 8 <= d->options->facet)
+		return 0;
 	for (int k = 0; k < 2; k++)
 		middle->uv[k] = 0.5 * (a->uv[k] + b->uv[k]);
 	find_place(middle, d);
-	v3d_sub(along, b->at, a->at);
 	v3d_sub(away, middle->at, a->at);
-	square = v3d_dot(along, along);
 	t = square > 0 ? fmin(fmax(v3d_dot(away, along) / square, 0), 1) : 0;
 	v3d_add_scaled(away, away, -t, along);
 	return v3d_length(away);
