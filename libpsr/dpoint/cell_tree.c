@@ -47,6 +47,7 @@ struct making {
 	struct cell_ball *ball;
 	struct entry *entry;
 	const struct dpoint_cell *cell;
+	size_t first; /* node of a level that threads divide */
 };
 
 static inline float lesser(float a, float b)
@@ -167,21 +168,19 @@ static void split_part(int part, void *userdata)
 	split(m, i, m->node[i].begin, m->node[i].end);
 }
 
-/* The nodes above the threads'. */
-static void split_first(const struct making *m, size_t i, uint32_t begin, uint32_t end)
+/* Divides a node above the threads' parts, which are its level. */
+static void split_first(int of_level, void *userdata)
 {
-	const uint32_t half = begin + (end - begin) / 2;
+	const struct making *m = userdata;
+	const size_t i = m->first + (size_t)of_level;
+	const uint32_t begin = m->node[i].begin, end = m->node[i].end, half = begin + (end - begin) / 2;
 	int axis;
 
-	if (i >= FIRST_PART) {
-		m->node[i].begin = begin;
-		m->node[i].end = end;
-		return;
-	}
 	bound(m, i, begin, end, &axis);
 	select_kth(m->entry, begin, (long)end - 1, half, axis);
-	split_first(m, 2 * i + 1, begin, half);
-	split_first(m, 2 * i + 2, half, end);
+	m->node[2 * i + 1].begin = begin;
+	m->node[2 * i + 1].end = m->node[2 * i + 2].begin = half;
+	m->node[2 * i + 2].end = end;
 }
 
 /* Balls of two children begin at a multiple of their size. */
@@ -215,7 +214,10 @@ int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_
 	if (n < LEAST_SHARED) {
 		split(&m, 0, 0, (uint32_t)n);
 	} else {
-		split_first(&m, 0, 0, (uint32_t)n);
+		m.node[0].begin = 0;
+		m.node[0].end = (uint32_t)n;
+		for (m.first = 0; m.first < FIRST_PART; m.first = 2 * m.first + 1)
+			psr_pool_for(pool, (int)m.first + 1, split_first, &m);
 		psr_pool_for(pool, PARTS, split_part, &m);
 		for (size_t i = FIRST_PART; i-- > 0;)
 			join_widest(m.ball, i);

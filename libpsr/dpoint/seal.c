@@ -6,7 +6,6 @@
 #include <string.h>
 #include "base/array.h"
 #include "base/vec.h"
-#include "choice.h"
 #include "lid.h"
 
 #define CHUNK 512 /* cells */
@@ -25,7 +24,6 @@ struct sealing {
 	uint32_t *over;        /* by cell: a lid that covers it, or UINT32_MAX; NULL: not known */
 	struct cell_tree tree; /* of the lids' corners */
 	uint8_t *is_open;      /* by cell */
-	uint8_t *is_due;       /* likewise: open, and none of the candidates that come is over it */
 	float around[AROUND][2], behind;
 	int is_failed;
 };
@@ -266,66 +264,6 @@ static void find_over(struct sealing *s, const struct dpoint_choice *choice, con
 	}
 }
 
-/* ---- what comes in their way ---- */
-
-static size_t count_open(const struct sealing *s, const struct dpoint_cover *cover, uint32_t candidate)
-{
-	size_t n = 0;
-
-	for (uint32_t k = 0; k < cover->n[candidate]; k++) {
-		const struct cell_node *node = &cover->tree->node[cover->list[candidate][k]];
-
-		for (uint32_t c = node->begin; c < node->end; c++)
-			n += s->is_due[cover->tree->order[c]];
-	}
-	return n;
-}
-
-static void mark_done(struct sealing *s, const struct dpoint_cover *cover, uint32_t candidate)
-{
-	for (uint32_t k = 0; k < cover->n[candidate]; k++) {
-		const struct cell_node *node = &cover->tree->node[cover->list[candidate][k]];
-
-		for (uint32_t c = node->begin; c < node->end; c++)
-			s->is_due[cover->tree->order[c]] = 0;
-	}
-}
-
-/* Keeps candidates that were left out, such that each open cell that one of them covers gets one: first who covers most
- * of them. */
-static int keep_more(struct sealing *s, struct dpoint_choice *choice, const struct dpoint_cover *cover)
-{
-	struct heap heap = { malloc((cover->n_candidates + 1) * sizeof *heap.entry), 0 };
-
-	if (heap.entry == NULL)
-		return PSR_ERR_MEMORY;
-	memcpy(s->is_due, s->is_open, s->surface->n_cells);
-	for (uint32_t i = 0; i < cover->n_candidates; i++) {
-		const size_t n = choice->is_kept[i] ? 0 : count_open(s, cover, i);
-
-		if (n > 0)
-			heap.entry[heap.n++] = (struct heap_entry){ (float)n, i };
-	}
-	heap_make(&heap);
-	while (heap.n > 0) {
-		const uint32_t i = heap.entry[0].candidate;
-		const float n = (float)count_open(s, cover, i);
-
-		if (n > 0 && n < heap.entry[0].key) {
-			heap_lower(&heap, n);
-			continue;
-		}
-		heap_pop(&heap);
-		if (n == 0)
-			continue;
-		choice->is_kept[i] = 1;
-		choice->n_kept++;
-		mark_done(s, cover, i);
-	}
-	free(heap.entry);
-	return PSR_OK;
-}
-
 static int look_all(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_work *work)
 {
 	int rc = make_lids(s, choice, work->pool);
@@ -373,9 +311,8 @@ int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dp
 		return PSR_OK;
 	set_around(&s);
 	s.is_open = malloc(surface->n_cells);
-	s.is_due = malloc(surface->n_cells);
 	s.over = malloc(surface->n_cells * sizeof *s.over);
-	rc = s.is_open != NULL && s.is_due != NULL && s.over != NULL ? PSR_OK : PSR_ERR_MEMORY;
+	rc = s.is_open != NULL && s.over != NULL ? PSR_OK : PSR_ERR_MEMORY;
 	if (rc == PSR_OK) {
 		memset(s.is_open, 1, surface->n_cells);
 		find_over(&s, choice, cover);
@@ -384,7 +321,7 @@ int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dp
 	free(s.over); /* of these lids */
 	s.over = NULL;
 	if (rc == PSR_OK)
-		rc = keep_more(&s, choice, cover);
+		rc = keep_over_open(choice, cover, s.is_open);
 	if (rc == PSR_OK)
 		rc = look_all(&s, choice, work);
 	if (rc == PSR_OK)
@@ -392,6 +329,5 @@ int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dp
 	if (rc == PSR_OK)
 		rc = keep_planes(choice, before, surface->n_candidates);
 	free(s.is_open);
-	free(s.is_due);
 	return rc;
 }

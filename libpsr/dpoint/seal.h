@@ -13,4 +13,8 @@
 int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
          const struct dpoint_cover_options *options, const struct dpoint_work *work);
 
+/* Keeps candidates that were left out, such that each open cell (is_open, by cell) that one of them covers gets one: first
+ * who covers most of them. MEMORY. */
+int keep_over_open(struct dpoint_choice *choice, const struct dpoint_cover *cover, const uint8_t *is_open);
+
 #endif
