@@ -133,7 +133,8 @@ struct psr_import_options {
 	                 * fast, and fine enough for models of PSR_PREVIEW_RESOLUTION pixels. Thinner things may vanish */
 	uint32_t resolution; /* 8..8192: exact surfaces of STEP and IGES become triangles that are fine enough for models of so
 	                      * many pixels: they are off by an eighth of one at most */
-	int has_patches;     /* surfaces of STEP and IGES become patches, too, unless is_preview */
+	int has_patches;     /* surfaces of STEP and IGES become patches, too, unless is_preview; triangles of patches are off
+	                      * by half a pixel */
 };
 #define PSR_PREVIEW_RESOLUTION 64
 
