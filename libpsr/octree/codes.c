@@ -13,6 +13,35 @@ void octree_codes_end(struct codes_job *job)
 	job->model = NULL;
 }
 
+#define MOST_NODES (1u << 28) /* of a level: children have 32 bits */
+
+uint32_t codes_count(const struct codes_job *job)
+{
+	const struct octree_level *above = &job->levels->at[job->level - 1];
+
+	if (job->level == 0)
+		return job->levels->n_roots;
+	return above->first[above->n - 1] + octree_count(above->code[above->n - 1]);
+}
+
+void codes_begin_level(struct codes_job *job, uint32_t n)
+{
+	if (n > job->n_codes || n > MOST_NODES)
+		job->rc = PSR_ERR_FORMAT;
+	else if (!octree_level_reserve(&job->levels->at[job->level], n))
+		job->rc = PSR_ERR_MEMORY;
+}
+
+void codes_end_level(struct codes_job *job, uint32_t n)
+{
+	if (job->coder->has_failed)
+		job->rc = PSR_ERR_FORMAT;
+	if (job->rc != PSR_OK)
+		return;
+	octree_level_finish(&job->levels->at[job->level], n);
+	job->n_codes -= n;
+}
+
 static int code_levels(struct codes_job *job, struct coder *coder, int end, int is_decoding)
 {
 	job->coder = coder;

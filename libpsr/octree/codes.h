@@ -39,16 +39,11 @@ void *codes_mixed_model(void);
 void codes_fast_level(struct codes_job *job, int is_decoding);
 void codes_mixed_level(struct codes_job *job, int is_decoding);
 
-/* Keeps a code that was read. Returns 0 once there is one too many, or none left in the stream, or no memory. */
-static inline int codes_keep(struct codes_job *job, const struct coder *coder, uint8_t code)
-{
-	if (job->n_codes == 0 || coder->has_failed)
-		job->rc = PSR_ERR_FORMAT;
-	else if (!octree_level_put(&job->levels->at[job->level], code))
-		job->rc = PSR_ERR_MEMORY;
-	else
-		job->n_codes--;
-	return job->rc == PSR_OK;
-}
+/* How many nodes the next level has. */
+uint32_t codes_count(const struct codes_job *job);
+
+/* Around a level that is read: makes room for its codes; tells its first children. Both set job->rc. */
+void codes_begin_level(struct codes_job *job, uint32_t n);
+void codes_end_level(struct codes_job *job, uint32_t n);
 
 #endif

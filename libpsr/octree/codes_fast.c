@@ -35,36 +35,40 @@ static inline __attribute__((always_inline)) unsigned code_byte(struct coder *co
 	return (uint8_t)(so_far == 128 ? 1 : so_far << 1 | coder_adaptive(coder, is_decoding, &p[so_far], 4, code & 1));
 }
 
-static inline __attribute__((always_inline)) int code_level(struct codes_job *job, struct coder *coder, int is_decoding)
+static inline __attribute__((always_inline)) void code_level(struct codes_job *job, uint32_t n, int is_decoding)
 {
 	struct model *model = job->model;
 	const struct octree_level *above = job->level > 0 ? &job->levels->at[job->level - 1] : NULL;
-	const struct octree_level *level = &job->levels->at[job->level];
-	const uint32_t n = above != NULL ? above->n : job->levels->n_roots;
+	uint8_t *code = job->levels->at[job->level].code;
+	const uint8_t *const end = code + n;
+	struct coder coder = *job->coder; /* in registers */
 
-	for (uint32_t i = 0, next = 0; i < n; i++) {
+	for (uint32_t i = 0; code < end && !coder.has_failed; i++) {
 		const uint8_t parent = above != NULL ? above->code[i] : 1;
 
 		for (unsigned left = parent; left != 0; left &= left - 1) {
-			const unsigned j = (unsigned)__builtin_ctz(left);
-			uint16_t *p = model->p[model->mirrored[j][parent]];
+			const uint8_t *mirrored = model->mirrored[__builtin_ctz(left)];
+			uint16_t *p = model->p[mirrored[parent]];
 
-			if (!is_decoding)
-				code_byte(coder, 0, p, model->mirrored[j][level->code[next++]]);
-			else if (!codes_keep(job, coder, model->mirrored[j][code_byte(coder, 1, p, 0)]))
-				return 0;
+			if (is_decoding)
+				*code++ = mirrored[code_byte(&coder, 1, p, 0)];
+			else
+				code_byte(&coder, 0, p, mirrored[*code++]);
 		}
 	}
-	return 1;
+	*job->coder = coder;
 }
 
 void codes_fast_level(struct codes_job *job, int is_decoding)
 {
-	struct coder coder = *job->coder; /* in registers */
+	const uint32_t n = codes_count(job);
 
-	if (is_decoding)
-		code_level(job, &coder, 1);
-	else
-		code_level(job, &coder, 0);
-	*job->coder = coder;
+	if (!is_decoding) {
+		code_level(job, n, 0);
+		return;
+	}
+	codes_begin_level(job, n);
+	if (job->rc == PSR_OK)
+		code_level(job, n, 1);
+	codes_end_level(job, n);
 }

@@ -37,10 +37,23 @@ ALWAYS uint64_t shift_to(uint64_t spread, unsigned k)
 	return up >= 0 ? spread << up : spread >> -up;
 }
 
+/* Where octant j's window begins. */
+ALWAYS unsigned corner_of(unsigned j)
+{
+	return (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2);
+}
+
 /* Which neighbours of its parent octant j touches, with the parent itself. */
 ALWAYS uint32_t touched_by(unsigned j, uint32_t there)
 {
 	return there >> ((j & 1) + 3 * (j >> 1 & 1) + 9 * (j >> 2)) & 0x361b;
+}
+
+/* Which of the node's six faces have a neighbour. */
+ALWAYS unsigned faces_of(uint32_t there)
+{
+	return (there >> 4 & 1) | (there >> 9 & 2) | (there >> 10 & 4) | (there >> 11 & 8) | (there >> 12 & 16) |
+	       (there >> 17 & 32);
 }
 
 /* Eight bits of 64, one after the other: those at 0 and 1 of each axis of a neighbourhood, or at 0 and 2. */
@@ -81,37 +94,40 @@ struct bases {
 	int16_t *part[OWN_PARTS];
 	int32_t sum;
 	unsigned set; /* of weights */
+	words logit;
+	int32_t share; /* of a 1, in 65536ths */
 };
 
-/* *step: what the parts of this octant change by. */
-ALWAYS unsigned mix_bit(struct codes_model *model, struct coder *coder, int is_decoding, int is_sparse,
-                        const struct bases *bases, int16_t *step, unsigned bit)
+ALWAYS void mix(struct bases *bases, const struct codes_model *model, int is_sparse)
 {
-	const words logit = { model->logit[*bases->p[0] >> 20],
-		                  model->logit[*bases->p[1] >> 20],
-		                  is_sparse ? 0 : model->logit[*bases->p[2] >> 20],
-		                  is_sparse ? 0 : model->logit[*bases->p[3] >> 20],
-		                  is_sparse ? 0 : model->logit[*bases->p[4] >> 20],
-		                  256,
-		                  (int16_t)bases->sum,
-		                  0 };
-	words *weight = &model->weight[bases->set];
-	const int32_t share = model->share[2048 + held(words_weigh(logit, *weight) >> 13)];
-	int32_t one;
+	bases->logit = (words){ model->logit[*bases->p[0] >> 20],
+		                    model->logit[*bases->p[1] >> 20],
+		                    is_sparse ? 0 : model->logit[*bases->p[2] >> 20],
+		                    is_sparse ? 0 : model->logit[*bases->p[3] >> 20],
+		                    is_sparse ? 0 : model->logit[*bases->p[4] >> 20],
+		                    256,
+		                    (int16_t)bases->sum,
+		                    0 };
+	bases->share = model->share[2048 + held(words_weigh(bases->logit, model->weight[bases->set]) >> 13)];
+}
 
-	bit = coder_bit(coder, is_decoding, (uint32_t)share, bit);
-	one = (int32_t)(bit << 16);
-	*step = (int16_t)(((one - model->share[2048 + bases->sum]) * PART_LEARN + 32768) >> 16);
+/* Returns what the parts of this octant change by. */
+ALWAYS int16_t learn_bit(struct codes_model *model, const struct bases *bases, int is_sparse, unsigned bit)
+{
+	const int32_t one = (int32_t)(bit << 16);
+	const int16_t step = (int16_t)(((one - model->share[2048 + bases->sum]) * PART_LEARN + 32768) >> 16);
+	words *weight = &model->weight[bases->set];
+
 #pragma GCC unroll 8
 	for (int i = 0; i < OWN_PARTS; i++)
 		if (!is_sparse)
-			*bases->part[i] = word_held(*bases->part[i] + *step);
-	*weight = words_learn(*weight, logit, (int16_t)(((one - share) * LEARN + 128) >> 8));
+			*bases->part[i] = word_held(*bases->part[i] + step);
+	*weight = words_learn(*weight, bases->logit, (int16_t)(((one - bases->share) * LEARN + 128) >> 8));
 #pragma GCC unroll 8
 	for (int i = 0; i < CONTEXTS; i++)
 		if (!is_sparse || i < SPARSE_CONTEXTS)
 			learn(model, bases->p[i], bit);
-	return bit;
+	return step;
 }
 
 static inline uint32_t scatter(uint64_t x, int bits)
@@ -181,7 +197,7 @@ ALWAYS void find_slots(uint32_t *b[8], uint32_t *d[8], struct codes_model *model
 {
 #pragma GCC unroll 4
 	for (unsigned j = first; j < first + 4; j++) {
-		const uint64_t window = around->known >> ((j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2)) & WINDOW;
+		const uint64_t window = around->known >> corner_of(j) & WINDOW;
 		const uint64_t key = window << 3 | j;
 		const uint64_t more = (uint64_t)touched_by(j, around->there) << 50 ^ (uint64_t)around->row << 48;
 
@@ -194,72 +210,99 @@ ALWAYS void find_slots(uint32_t *b[8], uint32_t *d[8], struct codes_model *model
 	}
 }
 
-ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_near *near, int is_decoding,
+/* A node whose code is under way. */
+struct coding {
+	struct around around;
+	uint32_t faces, *b[8], *d[8], *e;
+	int16_t sum[8];
+};
+
+/* Finds what octant j is foretold by, after so much of the code. */
+ALWAYS void foretell(struct bases *bases, struct codes_model *model, const struct coding *node, unsigned j,
+                     unsigned so_far, int is_sparse)
+{
+	const unsigned corner = corner_of(j), of_half = j < 4 ? so_far : so_far >> 4;
+	const uint64_t window = node->around.known >> corner, behind = node->around.behind >> corner;
+
+	bases->p[0] = node->d[j] + of_half;
+	bases->p[1] = &node->e[j];
+	bases->set = model->set_by_d[*bases->p[0] & 1023] + model->set_by_e[*bases->p[1] & 1023] + 2 * j + (so_far != 0);
+	bases->sum = node->sum[j];
+	if (!is_sparse) {
+		const unsigned near_ones = gather_near(behind >> 21), far_ones = gather_far(behind);
+
+		bases->p[2] = &model->a[node->faces << 8 | 1u << j | so_far];
+		bases->p[3] = node->b[j] + of_half;
+		bases->p[4] = &model->f[j << 14 | near_ones << 7 | far_ones];
+		bases->part[0] = &model->of_own[j][so_far];
+		bases->part[1] = &model->of_window[j][0][window & PLANE];
+		bases->part[2] = &model->of_window[j][1][window >> 16 & PLANE];
+		bases->part[3] = &model->of_near[j][near_ones];
+		bases->part[4] = &model->of_far[j][far_ones];
+#pragma GCC unroll 8
+		for (int i = 0; i < OWN_PARTS; i++)
+			bases->sum += *bases->part[i];
+		bases->sum = held(bases->sum >> 4);
+	}
+	mix(bases, model, is_sparse);
+}
+
+ALWAYS void code_node(struct codes_job *job, uint32_t at, const struct octree_near *near, int is_decoding,
                       int is_sparse)
 {
-	static const uint8_t none = 0;
 	struct codes_model *model = job->model;
 	const struct octree_level *level = &job->levels->at[job->level];
-	const unsigned code = is_decoding ? 0 : level->code[node];
+	const unsigned code = is_decoding ? 0 : level->code[at];
 	const int up = job->levels->height - 1 - job->level;
-	struct around around = { .row = up < 3 ? up : 3 };
-	uint32_t faces, *b[8], *d[8], *e;
+	/* To wait for a bit takes longer than to find what the next one is foretold by for both. */
+	const int is_both = is_decoding && is_sparse;
+	struct coding node = { .around.row = up < 3 ? up : 3 };
 	words *part[PLANES + CODES], sums = { 0 };
-	int16_t sum[8], step[8] = { 0 };
+	int16_t step[8] = { 0 };
+	struct bases bases[8][2];
 	struct coder coder = *job->coder; /* in registers */
-	unsigned so_far = 0;
+	unsigned so_far = 0, bit = 0;
+	const uint32_t *learnt = NULL; /* of the octant before, with which one may share its place */
 
-	look_around(&around, model, node > 0 ? level->code : &none, node, near, is_sparse);
-	e = &model->e[scatter((uint64_t)around.there * 0x100000001b3u, E_BITS - 3) << 3];
-	__builtin_prefetch(e, 1);
-	find_slots(b, d, model, &around, 0, is_sparse);
-	find_parts(part, model, &around);
+	look_around(&node.around, model, level->code, at, near, is_sparse);
+	node.e = &model->e[scatter((uint64_t)node.around.there * 0x100000001b3u, E_BITS - 3) << 3];
+	__builtin_prefetch(node.e, 1);
+	find_slots(node.b, node.d, model, &node.around, 0, is_sparse);
+	find_parts(part, model, &node.around);
 #pragma GCC unroll 21
 	for (int i = 0; i < PLANES + CODES; i++)
 		sums = words_add(sums, *part[i]);
 	if (is_sparse)
 		sums >>= 4;
-	memcpy(sum, &sums, sizeof sum);
-	faces = (around.there >> 4 & 1) | (around.there >> 9 & 2) | (around.there >> 10 & 4) | (around.there >> 11 & 8) |
-	        (around.there >> 12 & 16) | (around.there >> 17 & 32);
+	memcpy(node.sum, &sums, sizeof sums);
+	node.faces = faces_of(node.around.there);
 #pragma GCC unroll 8
 	for (unsigned j = 0; j < 8; j++) {
-		const unsigned corner = (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2);
-		const unsigned of_half = j < 4 ? so_far : so_far >> 4;
-		const uint64_t window = around.known >> corner, behind = around.behind >> corner;
-		struct bases bases;
-		unsigned bit;
+		const int is_foretold = is_both && j % 4 != 0;
+		struct bases *now = &bases[j][is_foretold ? bit : 0];
+		int32_t share;
 
-		if (j == 4)
-			find_slots(b, d, model, &around, 4, is_sparse);
 		if (j == 7 && so_far == 0) { /* no code is 0 */
 			so_far = 128;
 			break;
 		}
-		bases.p[0] = d[j] + of_half;
-		bases.p[1] = &e[j];
-		bases.set = model->set_by_d[*bases.p[0] & 1023] + model->set_by_e[*bases.p[1] & 1023] + 2 * j + (so_far != 0);
-		bases.sum = sum[j];
-		if (!is_sparse) {
-			const unsigned near_ones = gather_near(behind >> 21), far_ones = gather_far(behind);
-
-			bases.p[2] = &model->a[faces << 8 | 1u << j | so_far];
-			bases.p[3] = b[j] + of_half;
-			bases.p[4] = &model->f[j << 14 | near_ones << 7 | far_ones];
-			bases.part[0] = &model->of_own[j][so_far];
-			bases.part[1] = &model->of_window[j][0][window & PLANE];
-			bases.part[2] = &model->of_window[j][1][window >> 16 & PLANE];
-			bases.part[3] = &model->of_near[j][near_ones];
-			bases.part[4] = &model->of_far[j][far_ones];
-#pragma GCC unroll 8
-			for (int i = 0; i < OWN_PARTS; i++)
-				bases.sum += *bases.part[i];
-			bases.sum = held(bases.sum >> 4);
+		if (j == 4)
+			find_slots(node.b, node.d, model, &node.around, 4, is_sparse);
+		if (!is_foretold || now->p[0] == learnt)
+			foretell(now, model, &node, j, so_far, is_sparse);
+		share = bases[j][0].share;
+		if (is_foretold) /* without waiting for memory */
+			share ^= (share ^ bases[j][1].share) & -(int32_t)bit;
+		if (is_both && j % 4 != 3) {
+			foretell(&bases[j + 1][0], model, &node, j + 1, so_far, is_sparse);
+			foretell(&bases[j + 1][1], model, &node, j + 1, so_far | 1u << j, is_sparse);
 		}
-		bit = mix_bit(model, &coder, is_decoding, is_sparse, &bases, &step[j], code >> j & 1);
+		bit = coder_bit(&coder, is_decoding, (uint32_t)share, code >> j & 1);
 		so_far |= bit << j;
-		around.known |= (uint64_t)bit << (corner + 21);
-		around.behind |= (uint64_t)bit << (corner + 42);
+		step[j] = learn_bit(model, now, is_sparse, bit);
+		learnt = now->p[0];
+		node.around.known |= (uint64_t)bit << (corner_of(j) + 21);
+		node.around.behind |= (uint64_t)bit << (corner_of(j) + 42);
 	}
 	memcpy(&sums, step, sizeof sums);
 #pragma GCC unroll 21
@@ -267,53 +310,50 @@ ALWAYS void code_node(struct codes_job *job, uint32_t node, const struct octree_
 		*part[i] = words_add(*part[i], sums);
 	*job->coder = coder;
 	if (is_decoding)
-		codes_keep(job, &coder, (uint8_t)so_far);
+		level->code[at] = (uint8_t)so_far;
 }
 
 /* ---- a level ---- */
 
-static void pack_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
+static void pack_dense(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
 	code_node(userdata, node, near, 0, 0);
 }
 
-static void pack_sparse_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
+static void pack_sparse(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
 	code_node(userdata, node, near, 0, 1);
 }
 
-static void unpack_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
+static void unpack_dense(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
-	struct codes_job *job = userdata;
-
 	(void)path;
-	if (job->rc == PSR_OK)
-		code_node(job, node, near, 1, 0);
+	if (!((struct codes_job *)userdata)->coder->has_failed)
+		code_node(userdata, node, near, 1, 0);
 }
 
-static void unpack_sparse_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
+static void unpack_sparse(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
-	struct codes_job *job = userdata;
-
 	(void)path;
-	if (job->rc == PSR_OK)
-		code_node(job, node, near, 1, 1);
+	if (!((struct codes_job *)userdata)->coder->has_failed)
+		code_node(userdata, node, near, 1, 1);
 }
 
 void codes_mixed_level(struct codes_job *job, int is_decoding)
 {
-	struct codes_model *model = job->model;
-	const struct octree_level *above = job->level > 0 ? &job->levels->at[job->level - 1] : NULL;
-	const uint64_t n_above = above != NULL ? above->n : 0;
-	const uint64_t n = above != NULL ? above->first[n_above - 1] + octree_count(above->code[n_above - 1]) : 1;
-	const int is_sparse = n < SPARSE * n_above;
+	const uint32_t n = codes_count(job), n_above = job->level > 0 ? job->levels->at[job->level - 1].n : 0;
+	const int is_sparse = n < SPARSE * (uint64_t)n_above;
 
 	if (n_above >= FEW_NODES)
-		codes_model_forget(model, is_sparse);
-	if (is_decoding)
-		octree_levels_walk(job->levels, job->level, is_sparse ? unpack_sparse_node : unpack_node, job);
-	else
-		octree_levels_walk(job->levels, job->level, is_sparse ? pack_sparse_node : pack_node, job);
+		codes_model_forget(job->model, is_sparse);
+	if (!is_decoding) {
+		octree_levels_walk(job->levels, job->level, is_sparse ? pack_sparse : pack_dense, job);
+		return;
+	}
+	codes_begin_level(job, n);
+	if (job->rc == PSR_OK)
+		octree_levels_walk(job->levels, job->level, is_sparse ? unpack_sparse : unpack_dense, job);
+	codes_end_level(job, n);
 }

@@ -46,6 +46,31 @@ int octree_level_put(struct octree_level *level, uint8_t code)
 	return 1;
 }
 
+int octree_level_reserve(struct octree_level *level, uint32_t n)
+{
+	uint8_t *codes = malloc(n);
+	uint32_t *first = malloc((size_t)n * sizeof *first);
+
+	free(level->code);
+	free(level->first);
+	*level = (struct octree_level){ .room = n, .code = codes, .first = first };
+	if (codes == NULL || first == NULL)
+		return 0;
+	codes[0] = 0;
+	return 1;
+}
+
+void octree_level_finish(struct octree_level *level, uint32_t n)
+{
+	uint32_t child = 0;
+
+	for (uint32_t i = 0; i < n; i++) {
+		level->first[i] = child;
+		child += octree_count(level->code[i]);
+	}
+	level->n = n;
+}
+
 /* ---- walking with neighbours ---- */
 
 struct walk {

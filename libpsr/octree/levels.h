@@ -28,11 +28,15 @@ struct octree_near {
 	uint32_t at[OCTREE_NEAR];
 };
 
-void octree_levels_fini(struct octree_levels *levels); /* frees what octree_level_put() allocated */
+void octree_levels_fini(struct octree_levels *levels); /* frees what the functions below allocated */
 
 /* Appends a node to a level, and sets its first child to the number of children of those before it. Returns 0 without
  * memory. */
 int octree_level_put(struct octree_level *level, uint8_t code);
+
+/* Makes room for n nodes, whose codes the caller then sets; then sets their first children. Returns 0 without memory. */
+int octree_level_reserve(struct octree_level *level, uint32_t n);
+void octree_level_finish(struct octree_level *level, uint32_t n);
 
 /* Visits all nodes of a level, 0 to height (the leaves), in Morton order. Levels above it must be whole; the codes of
  * the level itself are not read. */
