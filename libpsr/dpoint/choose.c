@@ -1,4 +1,5 @@
-/* Few candidates that cover all cells: a front sweeps over the surface, and what became superfluous is pruned. */
+/* Few candidates that cover all cells: a front sweeps over the surface, what became superfluous is pruned, and some are
+ * exchanged for fewer. */
 #include <math.h>
 #include <stdlib.h>
 #include "choice.h"
@@ -228,8 +229,10 @@ int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover
 			if (choice->is_kept[i])
 				heap.entry[heap.n++] = (struct heap_entry){ -(float)dpoint_cover_size(cover, i), i };
 		choice_prune(choice, &heap, &tally);
-		choice_finish(choice, &tally);
+		rc = choice_swap(choice, cover);
 	}
+	if (rc == PSR_OK)
+		choice_finish(choice, &tally); /* swapping leaves no cell open, so the tally's holes are its holes */
 	front_fini(&front);
 	free(open.weight);
 	choice_fini(&heap, &tally);

@@ -9,6 +9,7 @@
 
 #define CHOICE 48       /* candidates of the first turn in a rectangle; decision 0112 */
 #define MOST_SPARSE 256
+#define THIN 4          /* one of so many candidates comes second where one of the first alone is; decision 0162 */
 
 /* Brings the candidates that `is_first` is set for to the front, from `first` on, in their order. Returns their end. */
 static size_t bring_forward(struct dpoint_surface *surface, size_t first, size_t n, const uint8_t *is_first,
@@ -26,31 +27,34 @@ static size_t bring_forward(struct dpoint_surface *surface, size_t first, size_t
 	return end;
 }
 
-static void mark_below(uint8_t *is_open, const struct tally *tally, size_t i)
+/* What a cell has of a cover's candidates. */
+enum { ENOUGH, ONE, NONE };
+
+/* above: candidates that have a node above this one in their lists. */
+static void mark_below(uint8_t *has, const struct tally *tally, size_t i, uint32_t above)
 {
 	const struct cell_tree *tree = tally->cover->tree;
 
-	if (tally->least[i] > 0 || tally->own[i] > 0)
+	if (above + tally->least[i] > 1)
 		return;
 	if (cell_node_is_leaf(&tree->node[i])) {
-		is_open[tree->order[tree->node[i].begin]] = 1;
+		has[tree->order[tree->node[i].begin]] = above + tally->least[i] > 0 ? ONE : NONE;
 		return;
 	}
-	mark_below(is_open, tally, 2 * i + 1);
-	mark_below(is_open, tally, 2 * i + 2);
+	mark_below(has, tally, 2 * i + 1, above + tally->own[i]);
+	mark_below(has, tally, 2 * i + 2, above + tally->own[i]);
 }
 
-/* The cells that the cover's candidates leave open. */
-static int find_open(uint8_t *is_open, const struct dpoint_cover *cover)
+static int mark_cells(uint8_t *has, const struct dpoint_cover *cover)
 {
 	struct tally tally;
 	int rc = tally_init(&tally, cover);
 
-	memset(is_open, 0, cover->n_cells);
+	memset(has, ENOUGH, cover->n_cells);
 	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
 		tally_add(&tally, i, 1);
 	if (rc == PSR_OK)
-		mark_below(is_open, &tally, 0);
+		mark_below(has, &tally, 0, 0);
 	tally_fini(&tally);
 	return rc;
 }
@@ -94,10 +98,10 @@ static int two_turns(struct dpoint_surface *surface, struct dpoint_cover *cover,
 {
 	const size_t n = surface->n_candidates;
 	struct dpoint_candidate *rest = malloc((n + 1) * sizeof *rest);
-	uint8_t *is_first = malloc(n + 1), *is_open = malloc(cover->n_cells + 1);
+	uint8_t *is_first = malloc(n + 1), *has = malloc(cover->n_cells + 1);
 	uint64_t seed = 1;
 	size_t end;
-	int rc = rest != NULL && is_first != NULL && is_open != NULL ? PSR_OK : PSR_ERR_MEMORY;
+	int rc = rest != NULL && is_first != NULL && has != NULL ? PSR_OK : PSR_ERR_MEMORY;
 
 	for (size_t i = 0; i < n && rc == PSR_OK; i++)
 		is_first[i] = random_below(&seed, sparsity(surface, &surface->candidate[i], options, sparse)) == 0;
@@ -105,16 +109,19 @@ static int two_turns(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	if (rc == PSR_OK)
 		rc = turn(surface, cover, bring_forward(surface, 0, n, is_first, rest), options, work);
 	if (rc == PSR_OK && surface->n_candidates < n)
-		rc = find_open(is_open, cover);
+		rc = mark_cells(has, cover);
 	if (rc == PSR_OK && surface->n_candidates < n) {
-		for (size_t i = surface->n_candidates; i < n; i++)
-			is_first[i] = is_open[surface->candidate[i].cell];
+		for (size_t i = surface->n_candidates; i < n; i++) {
+			const uint8_t has_some = has[surface->candidate[i].cell];
+
+			is_first[i] = has_some == NONE || (has_some == ONE && random_below(&seed, THIN) == 0);
+		}
 		end = bring_forward(surface, surface->n_candidates, n, is_first, rest);
 		rc = turn(surface, cover, end, options, work);
 	}
 	free(rest);
 	free(is_first);
-	free(is_open);
+	free(has);
 	return rc;
 }
 

@@ -144,15 +144,17 @@ struct dpoint_choice {
 
 /* Chooses few candidates that cover every cell that any of them covers. A front sweeps along the longest side: the first
  * cell that is not covered yet gets, of the candidates that cover it, the one that covers most that is not. Those that
- * others made superfluous are pruned. The same for any pool. MEMORY; dpoint_choice_fini() even then. */
+ * others made superfluous are pruned, and kept ones exchanged for others where one takes the place of several. The same
+ * for any pool. MEMORY; dpoint_choice_fini() even then. */
 int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover);
 
 void dpoint_choice_fini(struct dpoint_choice *choice);
 
 /* All of it: fits candidates, mends holes, chooses, and keeps or adds points where slanted rays would slip through
  * (seal.h). Candidates come in two turns: of the first, every `sparse`-th at random (1: all), and fewer of those whose
- * rectangles are many cells wide; then those in cells that none of these covers; others are dropped. For candidates that
- * are much closer than their rectangles are wide, which takes so much less time.
+ * rectangles are many cells wide; then those in cells that none of these covers, and some of those in cells that one alone
+ * covers; others are dropped. For candidates that are much closer than their rectangles are wide, which takes so much less
+ * time.
  * MEMORY, CANCELLED; the caller ends cover and choice even then. */
 int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
                     const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool,

@@ -7,6 +7,7 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "dpoint/cell_tree.h"
+#include "dpoint/choice.h"
 #include "dpoint/group.h"
 #include "dpoint/sample.h"
 #include "patches.h"
@@ -411,6 +412,50 @@ static void points_have_their_own_deltas_where_that_is_shorter(void **state)
 	dpoint_surface_fini(&surface);
 }
 
+/* A plane of 4x4 candidates, each over its own part. One of a whole half, and then another, takes the place of eight. */
+static void one_candidate_takes_the_place_of_several(void **state)
+{
+	const struct dpoint_cover_options o = options(0.02, 3);
+	struct revolved plane;
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice = { NULL, 0, 0 };
+	uint32_t *count;
+
+	(void)state;
+	quadric(&plane, 0, 0, 0);
+	sample(&surface, &plane.patch, 4, 0.2501f);
+	assert_int_equal(surface.n_candidates, 16);
+	for (int half = 0; half < 2; half++) {
+		struct dpoint_candidate *wide = dpoint_surface_candidate(&surface);
+
+		*wide = surface.candidate[0];
+		for (int k = 0; k < 2; k++) {
+			const float along = fabsf(wide->point.u[k]);
+
+			wide->point.at[k] = k == 0 ? 0.5f - (float)half : 0;
+			wide->delta[0] = along > 0.5f ? (k == 0 ? 0.51f : 1.01f) : wide->delta[0];
+			wide->delta[1] = along > 0.5f ? wide->delta[1] : k == 0 ? 0.51f : 1.01f;
+		}
+	}
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &o, NULL, NULL), PSR_OK);
+	choice.is_kept = calloc(surface.n_candidates, 1);
+	count = calloc(surface.n_cells, sizeof *count);
+	assert_true(choice.is_kept != NULL && count != NULL);
+	memset(choice.is_kept, 1, 16);
+	assert_int_equal(choice_swap(&choice, &cover), PSR_OK);
+	for (uint32_t i = 0; i < 16; i++)
+		assert_false(choice.is_kept[i]);
+	assert_true(choice.is_kept[16] && choice.is_kept[17]);
+	count_all(count, &cover, choice.is_kept);
+	for (size_t c = 0; c < surface.n_cells; c++)
+		assert_true(count[c] > 0);
+	free(count);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+}
+
 static void of_nothing_nothing_is_chosen(void **state)
 {
 	const struct dpoint_cover_options o = options(0.02, 3);
@@ -443,6 +488,7 @@ int main(void)
 		cmocka_unit_test(threads_choose_the_same),
 		cmocka_unit_test(groups_hold_all_points_and_what_they_draw),
 		cmocka_unit_test(points_have_their_own_deltas_where_that_is_shorter),
+		cmocka_unit_test(one_candidate_takes_the_place_of_several),
 		cmocka_unit_test(of_nothing_nothing_is_chosen),
 	};
 
