@@ -137,6 +137,7 @@ endif
 L_CODEC  := -lturbojpeg
 L_CAD    := -Wl,--as-needed -lTKernel $(addprefix -lTK,XDESTEP XDEIGES STEP IGES \
 	XSBase XCAF LCAF CAF CDF Mesh TopAlgo BRep GeomBase G3d Math)
+L_PLATE  := $(L_CAD) -lTKFillet -lTKBO -lTKPrim
 L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
 L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
 L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
@@ -277,6 +278,7 @@ POOL_BENCH := $(BUILD)/tests/bench/pool
 OCTREE_BENCH := $(BUILD)/tests/bench/octree $(BUILD)/tests/bench/octree_draws
 OCTREE_RATES := $(BUILD)/tests/bench/octree_rates
 DPOINT_BENCH := $(BUILD)/tests/bench/dpoint_draws
+CAD_BENCH  := $(BUILD)/tests/bench/cad_plate
 CODEC_BENCH := $(BUILD)/tests/bench/codec
 DAEMON_BENCH := $(BUILD)/tests/bench/daemon
 REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
@@ -287,8 +289,8 @@ TRUTH      := $(BUILD)/tests/bench/truth
 BUDGET     := $(BUILD)/tests/bench/budget
 LARGE      := $(BUILD)/tests/bench/large
 LARGE_OCTREE := $(BUILD)/tests/bench/large_octree
-# Benchmarks run by hand, but are built with the tests, so that they are there when somebody wants to know. FRAMES and
-# OCTREE_RATES need packages that no test needs.
+# Benchmarks run by hand, but are built with the tests, so that they are there when somebody wants to know. FRAMES,
+# OCTREE_RATES and CAD_BENCH need packages that no test needs.
 ifeq ($(config),release)
 TEST_BIN   += $(BENCH) $(EFFECTS) $(CANCEL) $(POOL_BENCH) $(OCTREE_BENCH) $(DPOINT_BENCH) $(CODEC_BENCH) $(DAEMON_BENCH) $(REPROJECT_BENCH) \
 	$(VIEW_BENCH) $(LATENCY) $(FIRST) $(TRUTH) $(BUDGET) $(LARGE) $(LARGE_OCTREE)
@@ -358,6 +360,11 @@ $(OCTREE_BENCH): %: %.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
 $(POOL_BENCH) $(DPOINT_BENCH): %: %.c.o $(LIB)/libpsr.a
 	$(link) $(L_PSR)
+$(BUILD)/tests/bench/cad_plate.cc.o: ISA := -isystem $(OCC)
+$(CAD_BENCH): %: %.cc.o
+	@mkdir -p $(@D)
+	$(call say,LD,$@)
+	$(Q)$(CXX) $(LINK) $(LDFLAGS) -o $@ $^ $(L_PLATE)
 $(CODEC_BENCH): $(BUILD)/tests/bench/codec.c.o $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_PSR)
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
@@ -402,7 +409,7 @@ $(LARGE_OCTREE): $(BUILD)/tests/bench/large_octree.c.o $(LIB)/libpsr.a
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cancel bench-codec bench-daemon bench-dpoint bench-effects bench-model bench-octree bench-pool
+.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cad bench-cancel bench-codec bench-daemon bench-dpoint bench-effects bench-model bench-octree bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 # PSR_TEST names tests as tests/run does; only what they run is built. Scripts run programs of tests/tools and soak.
@@ -454,6 +461,7 @@ models: ## models: fetch the real models (dragon, bunny, engine, ...) into the c
 
 fetched := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/psr/models
 dragon := $(wildcard $(fetched)/dragon.ply)
+holes ?= 10
 only ?=
 seconds ?=
 bench: deps ## bench: install what is missing, build, time frames beside llvmpipe, Embree and the thesis, and as things grow (only="dragon table-8.2")
@@ -463,6 +471,12 @@ bench: deps ## bench: install what is missing, build, time frames beside llvmpip
 
 bench-budget: compile $(BUDGET) ## bench-budget: whether budgets of time are kept, what they give, and the geometric bound (args="--only dragon")
 	$(Q)$(BUDGET) $(args) --programs $(BIN) $(BUILD)/bench-budget $(fetched)
+
+bench-cad: compile $(CAD_BENCH) ## bench-cad: seconds that a plate of NURBS patches takes to become differential points (holes=10 a side)
+	$(Q)mkdir -p $(BUILD)/bench-cad
+	$(Q)[ -f $(BUILD)/bench-cad/plate$(holes).step ] || $(CAD_BENCH) $(holes) $(BUILD)/bench-cad/plate$(holes).step
+	$(Q)$(BIN)/psr-model build $(BUILD)/bench-cad/plate$(holes).step --representation dpoints -r 1024 \
+		-o $(BUILD)/bench-cad/plate$(holes).psr
 
 bench-cancel: compile $(CANCEL) ## bench-cancel: how long a frame goes on once it is cancelled, by scene (seconds=10 for each)
 	$(Q)$(CANCEL) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(seconds)

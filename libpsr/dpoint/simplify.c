@@ -9,7 +9,7 @@
 
 #define CHOICE 48       /* candidates of the first turn in a rectangle; decision 0112 */
 #define MOST_SPARSE 256
-#define THIN 4          /* one of so many candidates comes second where one of the first alone is; decision 0162 */
+#define THIN 12         /* one of so many candidates comes second where one of the first alone is; decision 0163 */
 
 /* Brings the candidates that `is_first` is set for to the front, from `first` on, in their order. Returns their end. */
 static size_t bring_forward(struct dpoint_surface *surface, size_t first, size_t n, const uint8_t *is_first,
