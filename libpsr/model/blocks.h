@@ -19,8 +19,9 @@ struct psr_projection {
 #define PSR_MAX_LEVELS 8
 
 /* How far a sample may be from the surface that it shows, before its depth is rounded, in spacings of its level
- * (psr_model_info): the modeller moves some to lattice points. */
-#define PSR_SAMPLE_OFF 0.55
+ * (psr_model_info): the modeller moves some to lattice points. In blocks that say so, it is the greater one. */
+#define PSR_SAMPLE_OFF 0.25
+#define PSR_SAMPLE_MOST_OFF 0.55
 
 /* A byte a block. */
 enum psr_block_flag {
@@ -40,7 +41,9 @@ enum psr_block_trait {
 	PSR_BLOCK_SHEER = 2,
 	/* A sheer block of things narrower than a sample's cell: an opacity is the share that they cover of a disc about
 	 * the sample, as wide as a step of the lattice. */
-	PSR_BLOCK_THIN = 4
+	PSR_BLOCK_THIN = 4,
+	/* Some samples are up to PSR_SAMPLE_MOST_OFF off the surface. */
+	PSR_BLOCK_OFF = 8
 };
 
 /* A run is PSR_RUN_BLOCKS blocks in a row: their numbers have the same quotient. It stores what is equal or near for
@@ -83,6 +86,7 @@ struct psr_blocks {
 	const int8_t *cone_x, *cone_y, *cone_z;
 	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
 	const uint8_t *traits;                  /* enum psr_block_trait; not without cones */
+	uint8_t traits_of_all;                  /* those that all blocks have: PSR_BLOCK_OFF of files before 6.6, or 0 */
 	const uint8_t *opacity;                 /* a sample, of PSR_OPAQUE; not without traits. NULL: all are opaque */
 	const uint8_t *visibility_index;        /* see psr_blocks_visibility() */
 	const uint64_t (*visibility_mask)[2];   /* 128 bits, one a triangle of directions; many blocks share one */
@@ -100,7 +104,7 @@ static inline unsigned psr_blocks_level(const struct psr_blocks *blocks, uint32_
 
 static inline unsigned psr_blocks_traits(const struct psr_blocks *blocks, uint32_t block)
 {
-	return blocks->traits != NULL ? blocks->traits[block] : 0;
+	return blocks->traits_of_all | (blocks->traits != NULL ? blocks->traits[block] : 0u);
 }
 
 #define PSR_OPAQUE 255

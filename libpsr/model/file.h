@@ -21,6 +21,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define FILE_MINOR_SCAN 3
 #define FILE_MINOR_MATERIAL 4
 #define FILE_MINOR_DELTAS 5
+#define FILE_MINOR_OFF 6 /* blocks: but for those of the trait off, samples are within PSR_SAMPLE_OFF */
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */
 #define FILE_HEADER_BYTES 64

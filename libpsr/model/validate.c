@@ -222,7 +222,7 @@ static int check_traits(const struct checker *c)
 	const struct psr_blocks *b = c->blocks;
 
 	for (uint32_t i = 0; b->traits != NULL && i < b->n_blocks; i++) {
-		if ((b->traits[i] & ~(PSR_BLOCK_BENT | PSR_BLOCK_SHEER | PSR_BLOCK_THIN)) != 0)
+		if ((b->traits[i] & ~(PSR_BLOCK_BENT | PSR_BLOCK_SHEER | PSR_BLOCK_THIN | PSR_BLOCK_OFF)) != 0)
 			return fail(c, "TRTS", "block %" PRIu32 " has unknown traits %d", i, b->traits[i]);
 		if ((b->traits[i] & (PSR_BLOCK_SHEER | PSR_BLOCK_THIN)) == PSR_BLOCK_THIN)
 			return fail(c, "TRTS", "block %" PRIu32 " is thin, but not sheer", i);

@@ -136,7 +136,7 @@ static inline float cull_place_error(const struct plan *plan, const struct plan_
 		drawn = DISC_RADIUS * apart > half ? DISC_RADIUS * apart : half;
 	else if (traits & PSR_BLOCK_THIN && apart >= 2)
 		drawn = half * (apart + 1);
-	return drawn + (float)PSR_SAMPLE_OFF * apart + depth_error;
+	return drawn + (float)(traits & PSR_BLOCK_OFF ? PSR_SAMPLE_MOST_OFF : PSR_SAMPLE_OFF) * apart + depth_error;
 }
 
 /* Visibility masks of the screen's regions, for one instance ([G] 6.3): one mask for each of the 10 x 10 ranges of

@@ -5,8 +5,7 @@
 #include <stdint.h>
 
 /* Where discs are cut, in steps of the lattice. Surfaces end anywhere on the way to the missing sample, in the mean
- * half a step away; but a sample may stand up to 0.55 steps off the surface (PSR_SAMPLE_OFF), most often beyond its
- * edge. Measured. */
+ * half a step away; but a sample may stand off the surface (PSR_SAMPLE_OFF), most often beyond its edge. Measured. */
 #define SPLAT_CUT 0.3f
 
 /* Samples of a block that have no neighbour along the lattice's three lines, one step on and one step back, where the

@@ -160,6 +160,8 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 		                          .pool = build->pool };
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
+	if (rc == PSR_OK)
+		rc = ray_scene_index_distances(build->scene, build->err);
 	if (rc != PSR_OK)
 		return rc;
 	if (surface_init(&build->surface, build->mesh, build->info.scale) != PSR_OK)

@@ -13,11 +13,13 @@
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
 
-/* The least costs of candidates, in samples: a single hit covers less than a triangle; a moved sample is off by up to
- * half a pixel. */
+/* The least costs of candidates, in samples: a single hit covers less than a triangle; a moved sample is away from its
+ * place and often off the surface. Further off than PSR_SAMPLE_OFF it is the last resort: what has no other sample. */
 #define HIT 1.5f
 #define MOVE 3
-#define MOST_MOVE PSR_SAMPLE_OFF
+#define MOVE_AWAY 12    /* a pixel from its place; as much off the surface */
+#define MOVE_TEXTURE 24 /* a pixel from its place, on a texture: it may take its color from beyond an edge */
+#define LAST_RESORT 1000
 
 /* A new block costs so much, in samples: what places that want it share is nearly all of it, so that many open one, and
  * few move (decision 0157). A moved sample costs more in a projection that faces the place worse than three others: many
@@ -160,31 +162,37 @@ int candidates_cover(const struct keeper *keeper, const struct field *field, con
 	return is_near_kept(keeper, place) || is_on_kept(keeper, field, place, &look);
 }
 
-/* Moved to the corners that try i found. */
+/* Moved to the corners that try i found, at a cost below `most`. */
 static void find_moves(struct candidates *candidates, const struct keeper *keeper, const struct place *place,
-                       const struct look *look, int i)
+                       const struct look *look, int i, float most)
 {
 	const struct corner *corner = look->corner[i];
 	const unsigned q = look->tries.projection[i];
 	const struct sheets *sheets = &keeper->sheets[q];
 	const float *p = look->projected[i];
 	const double ds = keeper->sampling->ds;
+	const int is_textured = sampling_material(keeper->sampling, place->surface & ~SURFACE_BACK)->base_texture.image >= 0;
 	const float aside = keeper->sampling->level == 0 && i >= CANDIDATE_TRIANGLES ? MOVE_ASIDE : 0;
 	float n[3];
 
 	projection_project(&sheets->projection, place->n, n);
 	for (int k = 0; k < 3; k++) {
-		double x, y, dx, dy, dz, distance2;
+		double x, y, dx, dy, dz, away, off, inner[3];
+		float z, cost;
 
 		sheets_point(sheets, corner[k].at.row, corner[k].at.col, &x, &y);
 		dx = x - (double)p[0];
 		dy = y - (double)p[1];
 		dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
-		distance2 = (dx * dx + dy * dy + dz * dz) / (ds * ds);
-		if (distance2 <= MOST_MOVE * MOST_MOVE)
-			candidates->move[candidates->n_moves++] = (struct candidate_move){
-				q, MOVE + aside + 24 * sqrtf((float)distance2), p[2] + (float)dz, corner[k].at
-			};
+		away = sqrt(dx * dx + dy * dy + dz * dz) / ds;
+		cost = MOVE + aside + (is_textured ? MOVE_TEXTURE : MOVE_AWAY) * (float)away;
+		if (away > PSR_SAMPLE_MOST_OFF || cost >= most)
+			continue;
+		z = p[2] + (float)dz;
+		projection_inner(&sheets->projection, x, y, (double)z, inner);
+		off = fmin(ray_scene_distance(keeper->sampling->scene, inner, away * ds) / ds, away); /* the place is there */
+		cost += MOVE_AWAY * (float)off + (off > PSR_SAMPLE_OFF ? LAST_RESORT : 0);
+		candidates->move[candidates->n_moves++] = (struct candidate_move){ q, cost, z, corner[k].at };
 	}
 }
 
@@ -222,7 +230,7 @@ static void find(struct candidates *candidates, const struct keeper *keeper, con
 			if (cost < least && patch_of(keeper, q, corner[k].ref)->kept != 0)
 				least = cost;
 		}
-		find_moves(candidates, keeper, place, look, i);
+		find_moves(candidates, keeper, place, look, i, least);
 	}
 }
 

@@ -129,6 +129,14 @@ static int is_sheer(const struct sampling *sampling, const struct surface_place 
 	return rgba[3] < 1;
 }
 
+/* Whether a moved sample ended far off the surface. */
+static int is_off(const struct sampling *sampling, const float p[3])
+{
+	const double point[3] = { (double)p[0], (double)p[1], (double)p[2] };
+
+	return ray_scene_distance(sampling->scene, point, PSR_SAMPLE_OFF * sampling->ds) == INFINITY;
+}
+
 static void make_sample(const struct keeper *keeper, const struct sample_ref *ref, struct kept_sample *sample)
 {
 	const struct sampling *sampling = keeper->sampling;
@@ -153,6 +161,8 @@ static void make_sample(const struct keeper *keeper, const struct sample_ref *re
 		sample->opacity = thin_opacity(sampling, sample->position, n);
 	if (sample->opacity < PSR_OPAQUE)
 		sample->traits = PSR_BLOCK_SHEER | PSR_BLOCK_THIN;
+	if ((patch->moved >> ref->at.sample & 1) != 0 && is_off(sampling, sample->position))
+		sample->traits |= PSR_BLOCK_OFF;
 	if (keeper->finer == NULL || !blend(keeper, n, facing, prim, sample))
 		look(sampling, &place, n, facing, sample);
 	sample->two_sided = (uint8_t)keep_is_two_sided(keeper, prim, sample->position, n);

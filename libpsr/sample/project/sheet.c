@@ -160,6 +160,7 @@ int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t
 		out->patch = p;
 	}
 	patch_put(&sheets->patch[out->patch], out->sample, z);
+	sheets->patch[out->patch].moved |= UINT64_C(1) << out->sample;
 	sheets->sample[out->patch][out->sample] = (struct sheet_sample){ z, surface };
 	return PSR_OK;
 }

@@ -37,6 +37,7 @@ struct patch {
 	uint64_t mask;      /* hits; */
 	uint64_t kept;      /* hits that the model keeps: sheets_keep() */
 	uint64_t first;     /* first hits of their rays, but for sheer ones: nothing hides them */
+	uint64_t moved;     /* hits that no ray found: sheets_add() */
 	uint16_t n_wanted;  /* uncovered places that it could cover: sheets_want() */
 	uint8_t two_sided;  /* sampling_is_sheet(), equal for all hits */
 };

@@ -356,7 +356,7 @@ static void sections_of_octrees_are_not_required(void **state)
 			assert_int_equal(file_get(entry + ENTRY_FLAGS, 2), 0);
 	}
 	assert_int_equal(file_get(copy + HEADER_MAJOR, 2), 6);
-	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 4);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 6);
 	free(copy);
 }
 

@@ -169,7 +169,7 @@ static const struct violation violations[] = {
 	{ "CONX", 3, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 3 is 60 instead of 127" },
 	{ "CONY", 4, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 4 is 80 instead of 127" },
 	{ "CONZ", 0, 1, 0x80, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 128 instead of 127" },
-	{ "TRTS", 2, 1, 8, "TRTS: block 2 has unknown traits 8" },
+	{ "TRTS", 2, 1, 16, "TRTS: block 2 has unknown traits 16" },
 	{ "TRTS", 2, 1, 4, "TRTS: block 2 is thin, but not sheer" },
 };
 
@@ -236,7 +236,7 @@ static void versions_are_refused_by_major_and_section(void **state)
 	bytes = copy_original();
 	file_put(bytes + HEADER_MAJOR, 2, 3);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-	assert_non_null(strstr(err.text, "the file has format 3.0, and this build reads 6.x"));
+	assert_non_null(strstr(err.text, "the file has format 3.6, and this build reads 6.x"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
@@ -245,6 +245,34 @@ static void versions_are_refused_by_major_and_section(void **state)
 	bytes = copy_original();
 	file_put(entry_of(bytes, "CAMS") + ENTRY_VERSION, 2, 2);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
+}
+
+static unsigned traits_in_version(unsigned minor, uint32_t block)
+{
+	uint8_t *bytes = copy_original();
+	struct psr_model *model = NULL;
+	unsigned traits;
+
+	file_put(bytes + HEADER_MINOR, 2, minor);
+	file_seal(bytes, n_bytes);
+	assert_int_equal(psr_model_parse(&model, bytes, n_bytes, NULL), PSR_OK);
+	traits = psr_blocks_traits(psr_model_blocks(model), block);
+	psr_model_unref(model);
+	free(bytes);
+	return traits;
+}
+
+/* Before 6.6 nothing said which samples are far off. */
+static void older_versions_have_samples_off_in_any_block(void **state)
+{
+	(void)state;
+	for (uint32_t b = 0; b < 6; b++) {
+		const unsigned traits = traits_in_version(6, b);
+
+		assert_int_equal(traits & PSR_BLOCK_OFF, 0);
+		assert_int_equal(traits_in_version(5, b), traits | PSR_BLOCK_OFF);
+		assert_int_equal(traits_in_version(0, b), traits | PSR_BLOCK_OFF);
+	}
 }
 
 static void unknown_sections_are_skipped_if_optional_and_named_if_required(void **state)
@@ -435,6 +463,7 @@ int main(void)
 		cmocka_unit_test(each_violated_rule_is_refused_by_its_name),
 		cmocka_unit_test(values_at_the_edge_of_a_rule_are_taken),
 		cmocka_unit_test(versions_are_refused_by_major_and_section),
+		cmocka_unit_test(older_versions_have_samples_off_in_any_block),
 		cmocka_unit_test(unknown_sections_are_skipped_if_optional_and_named_if_required),
 		cmocka_unit_test(masks_need_their_indices_and_their_number),
 		cmocka_unit_test(every_required_section_is_missed),
