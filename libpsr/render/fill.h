@@ -8,6 +8,11 @@
 #define FILL_LEVELS 15      /* 2^14 is the largest side */
 #define FILL_BRICK_LEVELS 5 /* where a brick is one cell */
 
+/* Pixels around a filled one are looked at for such as keep their depth: those of the smallest square about it that
+ * holds any, and of one pixel more to all sides; at most so many to each side. */
+#define FILL_NEAR 8
+#define FILL_APART 2 /* pixels */
+
 /* The cells of one level, with a border outside of the picture; `cell` is the one at (left, top). */
 struct fill_level {
 	uint32_t width, height; /* of the picture */
@@ -37,6 +42,8 @@ struct fill {
 	uint8_t *needs;   /* by marked brick: the greatest of `whole` around it */
 	uint32_t *left;   /* by brick, a bit a row: the row may have pixels that are not whole */
 	uint8_t *wants;   /* by brick: number of levels to pull */
+	float *own;       /* z' of marked bricks' pixels that keep it: of half a weight and more; NAN of others and around */
+	uint8_t *noted;   /* by brick: `own` has some */
 	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
 	size_t coarse_first[FILL_LEVELS], n_coarse;
 	int is_coarse;    /* a brick needs levels beyond brick_top */
@@ -49,7 +56,9 @@ struct fill {
 	const struct plan *plan;
 	struct fill_picture picture;
 	_Atomic int deepest; /* coarsest level with a cell of weight below a half: its depth comes from a coarser one */
-	_Atomic uint64_t n_changed, n_filled, n_moved; /* as of fill_counts */
+	_Atomic uint64_t n_changed, n_filled; /* as of fill_counts, as are the next two */
+	_Atomic uint64_t n_far;
+	_Atomic float reach;
 };
 
 /* Filling takes four steps; each begins when the one before has ended. Any thread may run the steps that take a row of
@@ -70,7 +79,9 @@ const uint8_t *fill_wants(struct fill *fill);
 void fill_pull(struct fill *fill, uint32_t row);
 
 /* 4. Pushes: sets the colour of every pixel of weight below WEIGHT_ONE and, where the weight is below a half, its
- * depth. Other pixels of rgb and depth stay. Adds the stage's counts and error bound to the report. CANCELLED. */
+ * depth: that of cells, unless it is FILL_APART pixels off those of all pixels beside that keep theirs; then it is that
+ * of the nearest of these. Other pixels of rgb and depth stay. Adds the stage's counts to the report, and to its error
+ * bound how far such a place may be from one that a sample shows. CANCELLED. */
 int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
 
 #endif

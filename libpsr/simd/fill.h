@@ -41,7 +41,6 @@ typedef void fill_push_fn(const struct fill_row *to, const struct fill_parents *
 #define FILL_PLACES (2 * FILL_WIDTH + 2 * FILL_BLOCK) /* one block more than can be listed */
 struct fill_places {
 	uint32_t n_filled; /* with no weight before, and now a finite depth */
-	uint32_t n_moved;  /* with less than half a weight before */
 	uint16_t at[FILL_PLACES], weight[FILL_PLACES], r[FILL_PLACES], g[FILL_PLACES], b[FILL_PLACES];
 	float z[FILL_PLACES]; /* interpolated, for any weight */
 };
@@ -51,6 +50,13 @@ struct fill_places {
  * returns how many; elements beyond them are undefined. */
 typedef uint32_t fill_push_picture_fn(struct fill_places *places, uint32_t *left, uint32_t bit,
                                       const struct fill_row *was, const struct fill_parents *parents);
+
+/* Finds the least difference of each of n values z from those of three rows that are the nearest to it, of own[k][-1] to
+ * own[k][1] at the first; INFINITY where all these are NaN. */
+typedef void fill_apart_fn(float *apart, const float *z, const float *const own[3], uint32_t n);
+
+/* Reads z' from n words of pixels of at least half a weight; NAN for others. */
+typedef void fill_own_fn(float *own, const uint64_t *word, const uint16_t *weight, uint32_t n);
 
 /* Reads z' from n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);

@@ -1,5 +1,5 @@
-/* fill_pull_weights, fill_pull_colors, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells;
- * whole, partial and empty ones, and outside of the picture. */
+/* fill_pull_weights, fill_pull_colors, fill_push, fill_push_picture, fill_apart, fill_own and fill_depths: rows of 1
+ * to FILL_WIDTH cells; whole, partial and empty ones, and outside of the picture. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -157,6 +157,51 @@ static void bench_push(struct check *c)
 	push_picture(c, FILL_WIDTH, 0);
 }
 
+static void apart(struct check *c, uint32_t n)
+{
+	const float *z = random_row(c, n, 0, 0, 0, 1).z, *own[3];
+	float *out = check_out(c, n, sizeof *out);
+
+	for (int k = 0; k < 3; k++)
+		own[k] = random_row(c, n, 1, 0, 0, 1).z;
+	check_units(c, n);
+	while (check_next(c)) {
+		c->simd->fill_apart(out, z, own, n);
+		check_settle(out, n);
+	}
+}
+
+static void random_apart(struct check *c)
+{
+	apart(c, 1 + check_below(c, 2 * FILL_WIDTH));
+}
+
+static void bench_apart(struct check *c)
+{
+	apart(c, 2 * FILL_WIDTH);
+}
+
+static void own(struct check *c, uint32_t n)
+{
+	const uint64_t *word = check_in(c, n, sizeof *word);
+	const uint16_t *weight = random_row(c, n, 0, 0, 0, 0).weight;
+	float *out = check_out(c, n, sizeof *out);
+
+	check_units(c, n);
+	while (check_next(c))
+		c->simd->fill_own(out, word, weight, n);
+}
+
+static void random_own(struct check *c)
+{
+	own(c, 1 + check_below(c, 2 * FILL_WIDTH));
+}
+
+static void bench_own(struct check *c)
+{
+	own(c, 2 * FILL_WIDTH);
+}
+
 static void depths(struct check *c, uint32_t n)
 {
 	uint64_t *word = check_in(c, n, sizeof *word);
@@ -185,10 +230,14 @@ int main(int argc, char **argv)
 		{ "fill_push: random cells", random_push, 2000, NULL },
 		{ "fill_push: infinite, huge, denormal and no numbers", spoilt_push, 2000, NULL },
 		{ "fill_push_picture: random and spoilt pixels", random_push_picture, 2000, NULL },
+		{ "fill_apart: depths, infinite ones and no numbers", random_apart, 500, NULL },
+		{ "fill_own: any words and weights", random_own, 500, NULL },
 		{ "fill_depths: any words", random_depths, 500, NULL },
 		{ "fill_pull_weights", bench_pull_weights, 0, "cell" },
 		{ "fill_pull_colors, from the picture", bench_pull_colors, 0, "cell" },
 		{ "fill_push_picture", bench_push, 0, "cell" },
+		{ "fill_apart", bench_apart, 0, "pixel" },
+		{ "fill_own", bench_own, 0, "pixel" },
 		{ "fill_depths", bench_depths, 0, "pixel" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);

@@ -337,7 +337,7 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		                                              16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
 	const struct fill_row *own = &parents->own, *beside = &parents->beside;
 	const uint32_t n = parents->n;
-	uint32_t to = 0, n_filled = 0, n_moved = 0;
+	uint32_t to = 0, n_filled = 0;
 	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
 		struct push p;
 
@@ -359,8 +359,6 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		_mm512_storeu_si512(places->at + to, _mm512_add_epi16(at, _mm512_set1_epi16((short)(2 * x))));
 		_mm512_storeu_si512(places->weight + to, weight);
 		_mm512_mask_storeu_epi16(was->weight + 2 * x, p.turn, _mm512_set1_epi16(GAPS_WHOLE));
-		n_moved += (uint32_t)__builtin_popcount(
-			_mm512_mask_cmplt_epu16_mask(p.turn, p.weight, _mm512_set1_epi16(GAPS_WHOLE / 2)));
 		for (uint32_t i = 0; i < n_turn; i += PARENTS) {
 			const struct listed l = find_listed(half_of(at, i), half_of(weight, i), parents, x, own_k, p.k);
 			const __mmask16 listed = (__mmask16)_bzhi_u32(0xffff, n_turn - i < PARENTS ? n_turn - i : PARENTS);
@@ -378,6 +376,5 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		to += n_turn;
 	}
 	places->n_filled = n_filled;
-	places->n_moved = n_moved;
 	return to;
 }

@@ -225,7 +225,6 @@ static inline void list_block(struct listing *list, const struct push_turn *p, u
 		places->b[to] = row->b[x];
 		places->z[to] = row->z[x];
 		places->n_filled += (weight[x] == 0) & (row->z[x] < INFINITY);
-		places->n_moved += weight[x] < GAPS_WHOLE / 2;
 		weight[x] = GAPS_WHOLE;
 	}
 	list->n = n_places + n_turn;
@@ -240,7 +239,7 @@ static inline uint32_t fill_push_picture(struct fill_places *places, uint32_t *l
 	struct push_turn turn;
 	struct listing list = { places, 0, left, bit };
 
-	places->n_filled = places->n_moved = 0;
+	places->n_filled = 0;
 	for (uint32_t x = 0; x < parents->n; x += FILL_BLOCK, list.left++) {
 		const uint32_t n = parents->n - x < FILL_BLOCK ? parents->n - x : FILL_BLOCK;
 		uint16_t *weight = pixels.weight + 2 * x;

@@ -50,6 +50,8 @@
 	.fill_pull_colors = KERNEL(fill_pull_colors),  \
 	.fill_push = KERNEL(fill_push),                \
 	.fill_push_picture = KERNEL(fill_push_picture),\
+	.fill_apart = fill_apart,                      \
+	.fill_own = fill_own,                          \
 	.fill_depths = fill_depths,                    \
 	.smooth_places = smooth_places,                \
 	.smooth = smooth,                              \
