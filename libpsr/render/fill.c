@@ -139,7 +139,7 @@ static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx
 	return end;
 }
 
-/* Notes the depths that pixels of bricks bx0..bx1-1 keep, while their weights are there. */
+/* Notes the depths of samples that pixels of bricks bx0..bx1-1 show, while their weights are there. */
 static void note_own(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by)
 {
 	const uint32_t x0 = bx0 * BRICK, x1 = bx1 * BRICK < fill->width ? bx1 * BRICK : fill->width;

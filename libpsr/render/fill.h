@@ -8,10 +8,13 @@
 #define FILL_LEVELS 15      /* 2^14 is the largest side */
 #define FILL_BRICK_LEVELS 5 /* where a brick is one cell */
 
-/* Pixels around a filled one are looked at for such as keep their depth: those of the smallest square about it that
- * holds any, and of one pixel more to all sides; at most so many to each side. */
+/* For a pixel that gets its depth from cells, samples are looked for that it or pixels around it show: in the smallest
+ * square with one that is FILL_APART pixels away at most along the view axis, and one pixel more to all sides; at most
+ * FILL_NEAR to each. But if the smallest square with any, and one pixel more, has FILL_MANY and none so near along the
+ * axis, it is among pixels of another surface, and gets the depth of the one that is nearest along the axis. */
 #define FILL_NEAR 8
 #define FILL_APART 2 /* pixels */
+#define FILL_MANY 6
 
 /* The cells of one level, with a border outside of the picture; `cell` is the one at (left, top). */
 struct fill_level {
@@ -42,7 +45,7 @@ struct fill {
 	uint8_t *needs;   /* by marked brick: the greatest of `whole` around it */
 	uint32_t *left;   /* by brick, a bit a row: the row may have pixels that are not whole */
 	uint8_t *wants;   /* by brick: number of levels to pull */
-	float *own;       /* z' of marked bricks' pixels that keep it: of half a weight and more; NAN of others and around */
+	float *own;       /* z' of samples that marked bricks' pixels show: those of any weight; NAN of others and around */
 	uint8_t *noted;   /* by brick: `own` has some */
 	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
 	size_t coarse_first[FILL_LEVELS], n_coarse;
@@ -79,8 +82,7 @@ const uint8_t *fill_wants(struct fill *fill);
 void fill_pull(struct fill *fill, uint32_t row);
 
 /* 4. Pushes: sets the colour of every pixel of weight below WEIGHT_ONE and, where the weight is below a half, its
- * depth: that of cells, unless it is FILL_APART pixels off those of all pixels beside that keep theirs; then it is that
- * of the nearest of these. Other pixels of rgb and depth stay. Adds the stage's counts to the report, and to its error
+ * depth, see above. Other pixels of rgb and depth stay. Adds the stage's counts to the report, and to its error
  * bound how far such a place may be from one that a sample shows. CANCELLED. */
 int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
 

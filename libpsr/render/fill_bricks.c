@@ -166,15 +166,17 @@ struct from {
 	float steep; /* from a difference in z' to pixels */
 };
 
-/* What is beside a filled pixel. */
+/* What is at a filled pixel and around it. */
 struct beside {
 	float distance2; /* of the nearest, in pixels, INFINITY without any */
-	float aside2;    /* the same across the view axis, at one depth */
-	float along;     /* the least along it, of any */
-	float z;         /* the nearest's */
+	float along;     /* the least distance along the view axis, of any; */
+	float z;         /* and the depth of that one; of equal ones the nearest aside, */
+	float aside2;    /* which is so far aside */
+	int n;           /* how many */
+	int is_among;    /* many show another surface */
 };
 
-/* The depth of a pixel that keeps its own, else NAN. */
+/* The depth of the sample that a pixel shows: NAN or INFINITY without any. */
 static float own_depth(const struct fill *fill, int32_t column, int32_t row)
 {
 	const uint32_t x = (uint32_t)column, y = (uint32_t)row;
@@ -188,65 +190,67 @@ static float own_depth(const struct fill *fill, int32_t column, int32_t row)
 	return word == PSR_WORD_EMPTY ? NAN : psr_float_from_bits((uint32_t)(word >> 32));
 }
 
-/* Looks at a pixel dx and dy aside, of depth z; returns whether it keeps that. */
-static int look_at(struct beside *beside, const struct from *from, int32_t dx, int32_t dy, float z)
+/* Looks at a pixel dx and dy aside that shows a sample of depth z. */
+static void look_at(struct beside *beside, const struct from *from, int32_t dx, int32_t dy, float z)
 {
 	const float apart = z - from->z, shift = apart * from->wider, along = fabsf(apart) * from->steep;
 	const float x = (float)dx + shift * (from->x + (float)dx), y = (float)dy + shift * (from->y + (float)dy);
-	const float distance2 = x * x + y * y + along * along;
+	const float distance2 = x * x + y * y + along * along, aside2 = (float)(dx * dx + dy * dy);
 
 	if (!(z < INFINITY))
-		return 0;
-	beside->along = along < beside->along ? along : beside->along;
-	if (distance2 < beside->distance2) {
-		beside->distance2 = distance2;
-		beside->aside2 = (float)(dx * dx + dy * dy);
+		return;
+	beside->n++;
+	beside->distance2 = distance2 < beside->distance2 ? distance2 : beside->distance2;
+	if (along < beside->along || (along == beside->along && aside2 < beside->aside2)) {
+		beside->along = along;
+		beside->aside2 = aside2;
 		beside->z = z;
 	}
-	return 1;
 }
 
-/* Ends early where what is found is no farther than `enough`, and its depth may stay. */
+/* Ends early where what is found is no farther than `enough`, and the pixel's depth stays. */
 static struct beside look_beside(const struct fill *fill, uint32_t x, uint32_t y, float z, float enough)
 {
 	const struct plan *plan = fill->plan;
 	const struct from from = { (float)((double)x + 0.5 - plan->center[0]), (float)((double)y + 0.5 - plan->center[1]), z,
 		                       plan->perspective ? 1 / z : 0, plan->perspective ? plan->focal / z : plan->focal };
-	struct beside beside = { INFINITY, INFINITY, INFINITY, z };
-	int32_t last = FILL_NEAR;
+	struct beside beside = { INFINITY, INFINITY, z, INFINITY, 0, 0 };
+	int32_t last = FILL_NEAR, first = FILL_NEAR;
 
-	for (int32_t ring = 1; ring <= last; ring++) {
-		int is_any = 0;
-
+	for (int32_t ring = 0; ring <= last; ring++) {
 		for (int32_t dy = -ring; dy <= ring; dy++)
 			for (int32_t dx = -ring; dx <= ring; dx += abs(dy) == ring ? 1 : 2 * ring) {
-				is_any |= look_at(&beside, &from, dx, dy, own_depth(fill, (int32_t)x + dx, (int32_t)y + dy));
+				look_at(&beside, &from, dx, dy, own_depth(fill, (int32_t)x + dx, (int32_t)y + dy));
 				if (beside.distance2 <= enough * enough && beside.along <= FILL_APART)
 					return beside;
 			}
-		if (is_any)
+		if (beside.along <= FILL_APART)
 			last = last < ring + 1 ? last : ring + 1;
+		else if (ring == first + 1 && beside.n >= FILL_MANY) {
+			beside.is_among = 1;
+			return beside;
+		}
+		first = beside.n > 0 && ring < first ? ring : first;
 	}
 	return beside;
 }
 
-/* Notes how far the depth that pixel (x, y) gets is from those beside it; returns the depth. */
+/* Notes how far the depth that pixel (x, y) gets is from those of samples; returns the depth. */
 static float note_depth(struct fill_counts *counts, const struct fill *fill, uint32_t x, uint32_t y, float z)
 {
 	const struct beside beside = look_beside(fill, x, y, z, counts->reach);
-	const int is_apart = beside.along > FILL_APART;
-	const float reach = sqrtf(is_apart ? beside.aside2 : beside.distance2);
+	const float reach = sqrtf(beside.is_among ? beside.aside2 : beside.distance2);
 
 	if (beside.distance2 == INFINITY)
 		counts->n_far++;
 	else if (reach > counts->reach)
 		counts->reach = reach;
-	return is_apart ? beside.z : z;
+	return beside.is_among ? beside.z : z;
 }
 
-/* How far a depth may be from one of the eight pixels around, along the view axis and in pixels, so that it is surely no
- * farther than counts->reach from that pixel in all: one that is `along` off is aside by no more than sqrt 2 and `along`
- * times the tangent of its angle to the axis. Below 0: no depth. */
+/* How far a depth may be from a sample in the pixel or one around it, along the view axis and in pixels, so that it is
+ * surely no farther than counts->reach from that in all: one that is `along` off is aside by no more than sqrt 2 and
+ * `along` times the tangent of its angle to the axis. Below 0: no depth. */
 static float reach_along(const struct fill_counts *counts, const struct fill *fill)
 {
 	const struct plan *plan = fill->plan;

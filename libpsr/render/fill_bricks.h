@@ -14,7 +14,7 @@ static inline struct fill_row fill_row_at(const struct fill_level *level, int32_
 		                      cell->weight + at, cell->z + at, cell->near + at };
 }
 
-/* `own` of a row of pixels, which may begin one pixel before it and end one beyond; row -1 and `height` are there, too. */
+/* `own` of a row of pixels, with one more on each side; rows -1 and `height` are there, too. */
 static inline float *fill_own_row(const struct fill *fill, uint32_t y)
 {
 	return fill->own + (size_t)(y + 1) * (fill->width + 2) + 1;
@@ -56,8 +56,8 @@ void fill_pull_colors(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
  * and below. */
 void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early);
 
-/* Pixels. far: their depth changed, and no pixel within FILL_NEAR keeps its own; reach: the greatest distance of any
- * other such one to the nearest that does, in pixels of its depth. */
+/* Pixels. far: their depth changed, and no pixel within FILL_NEAR shows a sample; reach: the greatest distance of any
+ * other such one to the nearest sample, in pixels of its depth. */
 struct fill_counts {
 	uint32_t n_changed, n_filled, n_far;
 	float reach;

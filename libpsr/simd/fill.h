@@ -55,7 +55,7 @@ typedef uint32_t fill_push_picture_fn(struct fill_places *places, uint32_t *left
  * own[k][1] at the first; INFINITY where all these are NaN. */
 typedef void fill_apart_fn(float *apart, const float *z, const float *const own[3], uint32_t n);
 
-/* Reads z' from n words of pixels of at least half a weight; NAN for others. */
+/* Reads z' from n words of pixels of any weight; NAN for those of none. */
 typedef void fill_own_fn(float *own, const uint64_t *word, const uint16_t *weight, uint32_t n);
 
 /* Reads z' from n words. */

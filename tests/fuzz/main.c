@@ -3,7 +3,7 @@
  *
  *   fuzz_x [-t SECONDS] [-s SEED] [-m BYTES] CORPUS...     folders or files; -t 0: the corpus alone
  *
- * Inputs stand in allocations of exactly their size. One that crashes, or takes over 10 s, is written to
+ * Inputs stand in allocations of exactly their size. One that crashes, or takes over 10 s of a processor, is written to
  * crash-NAME-SEED-ROUND in the program's own folder, and the message names it: give that file as CORPUS with -t 0 to
  * see it again. Prints TAP. Exit status: 0 all is well, 2 usage or no corpus, else a crash. */
 #include <dirent.h>
@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <unistd.h>
 #include "base/clock.h"
 
@@ -72,12 +73,12 @@ static void save_current(void)
 
 static void on_signal(int number)
 {
-	static const char hang[] = "fuzz: one input took over 10 s\n";
+	static const char hang[] = "fuzz: one input took over 10 s of a processor\n";
 
-	if (number == SIGALRM && write(2, hang, sizeof hang - 1) < 0)
+	if (number == SIGPROF && write(2, hang, sizeof hang - 1) < 0)
 		_exit(1);
 	save_current();
-	if (number == SIGALRM)
+	if (number == SIGPROF)
 		_exit(1);
 	signal(number, SIG_DFL);
 	raise(number);
@@ -85,6 +86,7 @@ static void on_signal(int number)
 
 static void run(const uint8_t *data, size_t n)
 {
+	static const struct itimerval most = { .it_value = { 10, 0 } }, none;
 	uint8_t *exact = malloc(n ? n : 1);
 
 	if (!exact) {
@@ -95,9 +97,9 @@ static void run(const uint8_t *data, size_t n)
 		memcpy(exact, data, n);
 	current = exact;
 	current_n = n;
-	alarm(10);
+	setitimer(ITIMER_PROF, &most, NULL);
 	LLVMFuzzerTestOneInput(exact, n);
-	alarm(0);
+	setitimer(ITIMER_PROF, &none, NULL);
 	free(exact);
 }
 
@@ -221,7 +223,7 @@ static double number(const char *text)
 
 int main(int argc, char **argv)
 {
-	static const int signals[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM };
+	static const int signals[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPROF };
 	const char *slash = strrchr(argv[0], '/'), *name = slash ? slash + 1 : argv[0];
 	const int folder = slash ? (int)(slash - argv[0]) + 1 : 0; /* characters of argv[0], the last slash included */
 	double budget = 10, start;
@@ -253,7 +255,7 @@ int main(int argc, char **argv)
 	if (__sanitizer_set_death_callback)
 		__sanitizer_set_death_callback(save_current);
 	for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++)
-		if (!__sanitizer_set_death_callback || signals[i] == SIGALRM || signals[i] == SIGABRT)
+		if (!__sanitizer_set_death_callback || signals[i] == SIGPROF || signals[i] == SIGABRT)
 			signal(signals[i], on_signal);
 
 	for (size_t i = 0; i < n_corpus; i++) {

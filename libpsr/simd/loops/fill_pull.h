@@ -213,7 +213,7 @@ static void fill_apart(float *restrict apart, const float *restrict z, const flo
 static void fill_own(float *restrict own, const uint64_t *restrict word, const uint16_t *restrict weight, uint32_t n)
 {
 	for (uint32_t x = 0; x < n; x++) {
-		const uint32_t none = weight[x] < GAPS_WHOLE / 2 ? UINT32_MAX : 0;
+		const uint32_t none = weight[x] == 0 ? UINT32_MAX : 0;
 
 		own[x] = psr_float_from_bits((uint32_t)(word[x] >> 32) | none);
 	}

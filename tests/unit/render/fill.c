@@ -118,8 +118,11 @@ static void dense_fill(struct dense *d, const struct plan *plan)
 /* ---- what is beside a filled pixel, in double ---- */
 
 struct beside {
-	double distance, along, aside; /* of the nearest, but along: the least of any */
-	float z, other;                /* the nearest's; of one that is as near, but for rounding */
+	double distance, along; /* of the nearest; the least along the axis: */
+	float z, other;         /* its depth; that of another one as near, but for rounding */
+	double aside;
+	int n;                  /* in the smallest square with any, and one pixel more: samples, */
+	double along_there;     /* and the least along the axis */
 };
 
 #define ROUNDING 1e-4 /* pixels: places are floats below 2^11 pixels, 2^-13 each */
@@ -132,46 +135,58 @@ static double from_center(const struct plan *plan, int axis, uint32_t at)
 static struct beside find_beside(const struct dense *d, const struct plan *plan, const uint16_t *weights, uint32_t x,
                                  uint32_t y, float depth)
 {
-	struct beside beside = { INFINITY, INFINITY, INFINITY, NAN, NAN };
+	struct beside beside = { INFINITY, INFINITY, NAN, NAN, INFINITY, 0, INFINITY };
 	const double z = (double)depth;
-	uint32_t side = 0;
+	int side = -1, first = FILL_NEAR;
 
-	for (uint32_t reach = 1; reach <= FILL_NEAR && (side == 0 || reach <= side + 1); reach++)
-		for (uint32_t v = y > reach ? y - reach : 0; v <= y + reach && v < d->height[0]; v++)
-			for (uint32_t u = x > reach ? x - reach : 0; u <= x + reach && u < d->width[0]; u++) {
-				const size_t at = (size_t)v * d->width[0] + u;
+	for (int reach = 0; reach <= FILL_NEAR && (side < 0 || reach <= side + 1); reach++) {
+		beside.n = reach <= first + 1 ? 0 : beside.n;
+		for (int v = (int)y - reach; v <= (int)y + reach; v++)
+			for (int u = (int)x - reach; u <= (int)x + reach; u++) {
+				if (u < 0 || v < 0 || u >= (int)d->width[0] || v >= (int)d->height[0])
+					continue;
+				const size_t at = (size_t)v * d->width[0] + (size_t)u;
 				const double own = (double)d->own[at], wider = plan->perspective ? own / z : 1;
-				const double dx = wider * from_center(plan, 0, u) - from_center(plan, 0, x);
-				const double dy = wider * from_center(plan, 1, v) - from_center(plan, 1, y);
+				const double dx = wider * from_center(plan, 0, (uint32_t)u) - from_center(plan, 0, x);
+				const double dy = wider * from_center(plan, 1, (uint32_t)v) - from_center(plan, 1, y);
 				const double along = (double)plan->focal * fabs(own - z) / (plan->perspective ? z : 1);
-				const double distance = sqrt(dx * dx + dy * dy + along * along);
+				const double aside = hypot(u - (double)x, v - (double)y);
 
-				if (weights[at] < WEIGHT_ONE / 2 || own == INFINITY)
+				if (weights[at] == 0 || own == INFINITY)
 					continue;
-				side = side ? side : reach;
-				beside.along = fmin(beside.along, along);
-				if (fabs(distance - beside.distance) <= ROUNDING)
-					beside.other = d->own[at];
-				if (distance >= beside.distance)
+				side = side < 0 && along <= FILL_APART ? reach : side;
+				first = reach < first ? reach : first;
+				beside.distance = fmin(beside.distance, sqrt(dx * dx + dy * dy + along * along));
+				if (reach > first + 1)
 					continue;
-				if (beside.distance - distance > ROUNDING)
-					beside.other = d->own[at];
-				else
-					beside.other = beside.z;
-				beside.distance = distance;
-				beside.aside = hypot((double)u - x, (double)v - y);
+				beside.n++;
+				beside.along_there = fmin(beside.along_there, along);
+				if (along > beside.along || (along == beside.along && aside >= beside.aside)) {
+					const int is_other = d->own[at] != beside.z && along <= beside.along + ROUNDING;
+
+					beside.other = is_other ? d->own[at] : beside.other;
+					continue;
+				}
+				beside.other = beside.along - along <= ROUNDING ? beside.z : d->own[at];
+				beside.along = along;
 				beside.z = d->own[at];
+				beside.aside = aside;
 			}
+	}
+	beside.n = first < FILL_NEAR ? beside.n : 0;
 	return beside;
+}
+
+static int is_among(const struct beside *beside, double rounding)
+{
+	return beside->n >= FILL_MANY && beside->along_there > FILL_APART + rounding;
 }
 
 /* Whether a filled pixel has the depth that it should. */
 static int has_depth(const struct beside *beside, float cells, float depth)
 {
-	const int is_apart = beside->along != INFINITY && beside->along > FILL_APART - ROUNDING;
-	const int is_near = beside->along == INFINITY || beside->along <= FILL_APART + ROUNDING;
-
-	return (is_near && depth == cells) || (is_apart && (depth == beside->z || depth == beside->other));
+	return (!is_among(beside, ROUNDING) && depth == cells)
+	       || (is_among(beside, -ROUNDING) && (depth == beside->z || depth == beside->other));
 }
 
 /* ---- pictures ---- */
@@ -328,7 +343,7 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 		assert_true(has_depth(&beside, c->z, ldexpf(p.fill.depth[i], -p.stack.exponent)));
 		n_far += beside.distance == INFINITY;
 		if (beside.distance < INFINITY)
-			reach = fmax(reach, beside.along > FILL_APART ? beside.aside : beside.distance);
+			reach = fmax(reach, is_among(&beside, 0) ? beside.aside : beside.distance);
 	}
 	reach = n_far ? fmax(reach, M_SQRT2 * (double)(2 << d.deepest)) : reach;
 	free(weights);
