@@ -63,7 +63,7 @@ void budget_densities(double density[BUDGET_RUNGS])
 /* ---- choice ---- */
 
 /* Without a frame of this rung: that of the nearest rung that has one, by the size of its pixels; without any: half a
- * pixel, and a cell of the first level that is as wide as the spacing. */
+ * pixel, as far as most samples may be off the surface, and two pixels or spacings aside to one that fills a pixel. */
 static double error_of(const struct budget_learnt *learnt, int rung)
 {
 	const double density = budget_density(&budget_ladder[rung]), spacing = budget_ladder[rung].spacing_px;
@@ -75,7 +75,7 @@ static double error_of(const struct budget_learnt *learnt, int rung)
 			if (i >= 0 && i < BUDGET_RUNGS && learnt->error[i] > 0)
 				return learnt->error[i] * budget_density(&budget_ladder[i]) / density;
 		}
-	return (M_SQRT1_2 + 0.55 * spacing + 2 * M_SQRT2 * fmax(spacing, 1)) / density;
+	return (M_SQRT1_2 + 0.25 * spacing + 2 * M_SQRT2 * fmax(spacing, 1)) / density;
 }
 
 static void set_price(struct budget_price *price, const struct budget_learnt *learnt, const struct budget_view *view,
