@@ -80,8 +80,8 @@ static float area_of(const struct dpoint_cell *cell)
 	return 0.5f * v3f_length(n);
 }
 
-/* One of how many candidates like this one comes first: `sparse`, or more where its rectangle is many cells wide: CHOICE
- * are enough to choose from. */
+/* One of how many candidates like this one comes first: `sparse`, or more where its rectangle is many cells wide:
+ * CHOICE are enough to choose from. */
 static uint32_t sparsity(const struct dpoint_surface *surface, const struct dpoint_candidate *candidate,
                          const struct dpoint_cover_options *options, uint32_t sparse)
 {

@@ -116,11 +116,11 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
                       const struct psr_cancel *cancel);
 void dpoint_cover_fini(struct dpoint_cover *cover);
 
-/* Adds a flat candidate over each cell that none covers, and to the cover: of a cloud, one as bent as its point if there
- * is such a one. It reaches over the cell's sides by 3 to 23 % of its size, or to the sides of a rectangle around
- * a triangle: so there is no hole where samples are too far apart for the options, or where a crease is finer than a cell,
- * and what is wrong there is as small as a cell. Left open are cells without an area, and some that are as bent as their
- * sides are long. */
+/* Adds a flat candidate over each cell that none covers, and to the cover: of a cloud, one as bent as its point if
+ * there is such a one. It reaches over the cell's sides by 3 to 23 % of its size, or to the sides of a rectangle around
+ * a triangle: so there is no hole where samples are too far apart for the options, or where a crease is finer than a
+ * cell, and what is wrong there is as small as a cell. Left open are cells without an area, and some that are as bent
+ * as their sides are long. */
 int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
                 const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel);
 
@@ -142,19 +142,19 @@ struct dpoint_choice {
 	size_t n_kept, n_holes;  /* n_holes: cells that no candidate covers, kept or not */
 };
 
-/* Chooses few candidates that cover every cell that any of them covers. A front sweeps along the longest side: the first
- * cell that is not covered yet gets, of the candidates that cover it, the one that covers most that is not. Those that
- * others made superfluous are pruned, and kept ones exchanged for others where one takes the place of several. The same
- * for any pool. MEMORY; dpoint_choice_fini() even then. */
+/* Chooses few candidates that cover every cell that any of them covers. A front sweeps along the longest side: the
+ * first cell that is not covered yet gets, of the candidates that cover it, the one that covers most that is not. Those
+ * that others made superfluous are pruned, and kept ones exchanged for others where one takes the place of several. The
+ * same for any pool. MEMORY; dpoint_choice_fini() even then. */
 int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover);
 
 void dpoint_choice_fini(struct dpoint_choice *choice);
 
 /* All of it: fits candidates, mends holes, chooses, and keeps or adds points where slanted rays would slip through
  * (seal.h). Candidates come in two turns: of the first, every `sparse`-th at random (1: all), and fewer of those whose
- * rectangles are many cells wide; then those in cells that none of these covers, and some of those in cells that one alone
- * covers; others are dropped. For candidates that are much closer than their rectangles are wide, which takes so much less
- * time.
+ * rectangles are many cells wide; then those in cells that none of these covers, and some of those in cells that one
+ * alone covers; others are dropped. For candidates that are much closer than their rectangles are wide, which takes so
+ * much less time.
  * MEMORY, CANCELLED; the caller ends cover and choice even then. */
 int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
                     const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool,
