@@ -25,6 +25,16 @@ static inline uint32_t psr_bits_from_float(float f)
 	return bits;
 }
 
+/* Splits 2^exponent into two factors, since it may not fit a float: x * factor[0] * factor[1] is exact unless the result
+ * does not fit. */
+static inline void psr_power_factors(float factor[2], int exponent)
+{
+	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
+
+	factor[0] = psr_float_from_bits((uint32_t)(127 + half) << 23);
+	factor[1] = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
+}
+
 /* Selects by bits, not branches, so that loops become vectors. */
 static inline float psr_choose(int condition, float yes, float no)
 {

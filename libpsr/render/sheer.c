@@ -303,15 +303,6 @@ static void draw_one(int i, void *userdata)
 	slots_give(&d->sheer->slots, slot);
 }
 
-/* Splits 2^exponent into two factors. Exact unless the result is beyond a float. */
-static void find_factors(float factor[2], int exponent)
-{
-	const int clamped = exponent < -252 ? -252 : exponent > 252 ? 252 : exponent;
-
-	factor[0] = psr_float_from_bits((uint32_t)(127 + clamped / 2) << 23);
-	factor[1] = psr_float_from_bits((uint32_t)(127 + clamped - clamped / 2) << 23);
-}
-
 void sheer_init(struct sheer *sheer)
 {
 	memset(sheer, 0, sizeof *sheer);
@@ -339,8 +330,8 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 
 	if (n_slots > sheer->n_tiles && make_tiles(sheer, n_slots))
 		return PSR_ERR_MEMORY;
-	find_factors(d.to_world, picture->exponent);
-	find_factors(d.to_stack, -picture->exponent);
+	psr_power_factors(d.to_world, picture->exponent);
+	psr_power_factors(d.to_stack, -picture->exponent);
 	const int rc = psr_pool_for_until(pool, &plan->cancel, (int)(plan->tiles_x * plan->tiles_y), draw_one, &d);
 	sheer->thin = (struct sheer_counts){ d.thin.any_blocks, d.thin.n_pixels };
 	sheer->glass = (struct sheer_counts){ d.glass.any_blocks, d.glass.n_pixels };

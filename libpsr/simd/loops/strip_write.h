@@ -47,15 +47,13 @@ static inline void strip_write(const struct strip *strip, const struct strip_tar
 		write_linear(strip, target, n);
 }
 
-/* Two factors, since 2^exponent may not fit a float: exact unless the result does not fit. */
 static void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
 {
-	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
-	const float first = psr_float_from_bits((uint32_t)(127 + half) << 23);
-	const float second = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
+	float factor[2];
 
+	psr_power_factors(factor, exponent);
 	for (uint32_t i = 0; i < n; i++)
-		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * first * second;
+		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * factor[0] * factor[1];
 }
 
 #endif
