@@ -44,7 +44,7 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 	}
 	const size_t n_own = (size_t)(width + 2) * (height + 2);
 	const size_t size = (cells + n_own) * sizeof(float) + cells * (4 * sizeof(uint16_t) + 1)
-	                    + (sizeof *fill->left + 7) * n_bricks + 2 * FILL_LEVELS * (bricks_x + bricks_y);
+	                    + (sizeof *fill->left + 6) * n_bricks + 2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	fill->storage = psr_grow_huge(fill->storage, &fill->storage_size, size);
 	if (fill->storage == NULL)
@@ -80,8 +80,7 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		fill->coarse_first[l] = fill->n_coarse;
 		fill->n_coarse += (size_t)fill->level[l].width * fill->level[l].height;
 	}
-	fill->noted = fill->coarse + fill->n_coarse;
-	memset(fill->noted, 0, n_bricks);
+	memset(fill->pulled, 0, n_bricks);
 	for (size_t i = 0; i < n_own; i++)
 		fill->own[i] = NAN;
 	fill->bricks_x = bricks_x;
@@ -139,28 +138,6 @@ static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx
 	return end;
 }
 
-/* Notes the depths of samples that pixels of bricks bx0..bx1-1 show, while their weights are there. */
-static void note_own(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by)
-{
-	const uint32_t x0 = bx0 * BRICK, x1 = bx1 * BRICK < fill->width ? bx1 * BRICK : fill->width;
-
-	for (uint32_t y = by * BRICK; y < (by + 1) * BRICK && y < fill->height; y++)
-		fill->simd->fill_own(fill_own_row(fill, y) + x0, psr_zstack_row(fill->picture.stack, y) + x0,
-		                     fill->picture.weight + (size_t)y * fill->width + x0, x1 - x0);
-	memset(fill->noted + (size_t)by * fill->bricks_x + bx0, 1, bx1 - bx0);
-}
-
-/* Forgets what an earlier picture noted of a brick. */
-static void forget_own(struct fill *fill, uint32_t bx, uint32_t by)
-{
-	uint8_t *noted = &fill->noted[(size_t)by * fill->bricks_x + bx];
-
-	for (uint32_t y = by * BRICK; *noted && y < (by + 1) * BRICK && y < fill->height; y++)
-		for (uint32_t x = bx * BRICK; x < (bx + 1) * BRICK && x < fill->width; x++)
-			fill_own_row(fill, y)[x] = NAN;
-	*noted = 0;
-}
-
 void fill_look(struct fill *fill, uint32_t row)
 {
 	const uint8_t *bricks = fill->picture.bricks + (size_t)row * fill->bricks_x;
@@ -168,20 +145,21 @@ void fill_look(struct fill *fill, uint32_t row)
 	uint8_t *pulled = fill->pulled + (size_t)row * fill->bricks_x;
 
 	memset(whole, 0, fill->bricks_x);
-	memset(pulled, 0, fill->bricks_x);
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		int level = 1;
 
 		end = bx + 1;
 		if (!bricks[bx]) {
-			forget_own(fill, bx, row);
+			if (pulled[bx])
+				fill_forget_own(fill, bx, row);
+			pulled[bx] = 0;
 			continue;
 		}
 		end = run_end(fill, fill->picture.bricks, bx, row, 0);
 		while (fill_pull_weights(fill, bx, end, row, level) < WEIGHT_ONE && level < fill->brick_top)
 			level++;
 		memset(pulled + bx, level, end - bx);
-		note_own(fill, bx, end, row);
+		fill_note_own(fill, bx, end, row);
 		for (uint32_t b = bx; b < end; b++)
 			whole[b] = (uint8_t)whole_level(fill, b, row);
 	}
@@ -418,19 +396,6 @@ static void run_coarse(struct fill *fill)
 	}
 }
 
-/* A place is as far from the surface as the sample beside it may be, and as it is from that; in perspective, that one's
- * pixels are wider by a share of at most the distance over the focal length. */
-static void add_error(struct psr_report *report, const struct fill *fill)
-{
-	double reach = (double)fill->reach;
-
-	if (fill->n_far)
-		reach = fmax(reach, M_SQRT2 * (double)(2 << fill->deepest)); /* along both axes */
-	if (fill->plan->perspective)
-		report->error_px += report->error_px * reach / (double)fill->plan->focal;
-	report->error_px += reach;
-}
-
 int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report)
 {
 	int rc = PSR_OK;
@@ -441,6 +406,6 @@ int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *repor
 		rc = psr_pool_for_until(pool, &fill->plan->cancel, (int)fill->bricks_y, push_row, fill);
 	report->count[PSR_STAGE_FILL] += fill->n_changed;
 	report->n_filled += fill->n_filled;
-	add_error(report, fill);
+	fill_add_error(report, fill);
 	return rc;
 }

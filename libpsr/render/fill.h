@@ -46,7 +46,6 @@ struct fill {
 	uint32_t *left;   /* by brick, a bit a row: the row may have pixels that are not whole */
 	uint8_t *wants;   /* by brick: number of levels to pull */
 	float *own;       /* z' of samples that marked bricks' pixels show: those of any weight; NAN of others and around */
-	uint8_t *noted;   /* by brick: `own` has some */
 	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
 	size_t coarse_first[FILL_LEVELS], n_coarse;
 	int is_coarse;    /* a brick needs levels beyond brick_top */

@@ -1,14 +1,8 @@
 #include "fill_bricks.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
-
-/* Pixels of a row in one call. Row by row: shorter steps defeat the prefetcher, and a pull takes a quarter longer. */
-#define FILL_PIECE 256
-
-#define ROUNDING 0.01f /* pixels: places and depths are floats; those of 2^14 pixels are rounded by 2^-10 */
 
 /* A copy of a piece of the picture that reaches over its border, padded. */
 struct picture_row {
@@ -159,147 +153,15 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 	}
 }
 
-/* Where a filled pixel is: x and y from where the view axis meets the picture. */
-struct from {
-	float x, y, z;
-	float wider; /* the factor from another z' to how much wider pixels are there, 0 if orthographic; */
-	float steep; /* from a difference in z' to pixels */
-};
-
-/* What is at a filled pixel and around it. */
-struct beside {
-	float distance2; /* of the nearest, in pixels, INFINITY without any */
-	float along;     /* the least distance along the view axis, of any; */
-	float z;         /* and the depth of that one; of equal ones the nearest aside, */
-	float aside2;    /* which is so far aside */
-	int n;           /* how many */
-	int is_among;    /* many show another surface */
-};
-
-/* The depth of the sample that a pixel shows: NAN or INFINITY without any. */
-static float own_depth(const struct fill *fill, int32_t column, int32_t row)
-{
-	const uint32_t x = (uint32_t)column, y = (uint32_t)row;
-	uint64_t word;
-
-	if (column < 0 || row < 0 || x >= fill->width || y >= fill->height)
-		return NAN;
-	if (fill->picture.bricks[y / BRICK * fill->bricks_x + x / BRICK])
-		return fill_own_row(fill, y)[x];
-	word = psr_zstack_row(fill->picture.stack, y)[x];
-	return word == PSR_WORD_EMPTY ? NAN : psr_float_from_bits((uint32_t)(word >> 32));
-}
-
-/* Looks at a pixel dx and dy aside that shows a sample of depth z. */
-static void look_at(struct beside *beside, const struct from *from, int32_t dx, int32_t dy, float z)
-{
-	const float apart = z - from->z, shift = apart * from->wider, along = fabsf(apart) * from->steep;
-	const float x = (float)dx + shift * (from->x + (float)dx), y = (float)dy + shift * (from->y + (float)dy);
-	const float distance2 = x * x + y * y + along * along, aside2 = (float)(dx * dx + dy * dy);
-
-	if (!(z < INFINITY))
-		return;
-	beside->n++;
-	beside->distance2 = distance2 < beside->distance2 ? distance2 : beside->distance2;
-	if (along < beside->along || (along == beside->along && aside2 < beside->aside2)) {
-		beside->along = along;
-		beside->aside2 = aside2;
-		beside->z = z;
-	}
-}
-
-/* Ends early where what is found is no farther than `enough`, and the pixel's depth stays. */
-static struct beside look_beside(const struct fill *fill, uint32_t x, uint32_t y, float z, float enough)
-{
-	const struct plan *plan = fill->plan;
-	const struct from from = { (float)((double)x + 0.5 - plan->center[0]), (float)((double)y + 0.5 - plan->center[1]), z,
-		                       plan->perspective ? 1 / z : 0, plan->perspective ? plan->focal / z : plan->focal };
-	struct beside beside = { INFINITY, INFINITY, z, INFINITY, 0, 0 };
-	int32_t last = FILL_NEAR, first = FILL_NEAR;
-
-	for (int32_t ring = 0; ring <= last; ring++) {
-		for (int32_t dy = -ring; dy <= ring; dy++)
-			for (int32_t dx = -ring; dx <= ring; dx += abs(dy) == ring ? 1 : 2 * ring) {
-				look_at(&beside, &from, dx, dy, own_depth(fill, (int32_t)x + dx, (int32_t)y + dy));
-				if (beside.distance2 <= enough * enough && beside.along <= FILL_APART)
-					return beside;
-			}
-		if (beside.along <= FILL_APART)
-			last = last < ring + 1 ? last : ring + 1;
-		else if (ring == first + 1 && beside.n >= FILL_MANY) {
-			beside.is_among = 1;
-			return beside;
-		}
-		first = beside.n > 0 && ring < first ? ring : first;
-	}
-	return beside;
-}
-
-/* Notes how far the depth that pixel (x, y) gets is from those of samples; returns the depth. */
-static float note_depth(struct fill_counts *counts, const struct fill *fill, uint32_t x, uint32_t y, float z)
-{
-	const struct beside beside = look_beside(fill, x, y, z, counts->reach);
-	const float reach = sqrtf(beside.is_among ? beside.aside2 : beside.distance2);
-
-	if (beside.distance2 == INFINITY)
-		counts->n_far++;
-	else if (reach > counts->reach)
-		counts->reach = reach;
-	return beside.is_among ? beside.z : z;
-}
-
-/* How far a depth may be from a sample in the pixel or one around it, along the view axis and in pixels, so that it is
- * surely no farther than counts->reach from that in all: one that is `along` off is aside by no more than sqrt 2 and
- * `along` times the tangent of its angle to the axis. Below 0: no depth. */
-static float reach_along(const struct fill_counts *counts, const struct fill *fill)
-{
-	const struct plan *plan = fill->plan;
-	const float reach = counts->reach - ROUNDING, rest = reach > 0 ? reach * reach - 2 : -1;
-	float tangent = 0, along;
-
-	if (rest <= 0)
-		return -1;
-	if (plan->perspective) {
-		const double x = fmax(plan->center[0], fill->width - plan->center[0]);
-		const double y = fmax(plan->center[1], fill->height - plan->center[1]);
-
-		tangent = (float)hypot(x, y) / plan->focal;
-	}
-	along = sqrtf(2 * tangent * tangent + (1 + tangent * tangent) * rest) - (float)M_SQRT2 * tangent;
-	along /= 1 + tangent * tangent;
-	return along < FILL_APART - ROUNDING ? along : FILL_APART - ROUNDING;
-}
-
-/* Changes the depths that places get where they are apart, and notes how far they are from those beside. */
-static void note_depths(struct fill_counts *counts, const struct fill *fill, uint32_t x, uint32_t y,
-                        struct fill_places *places, uint32_t n)
-{
-	const struct plan *plan = fill->plan;
-	const float along = reach_along(counts, fill) / plan->focal;
-	const float *own[3] = { fill_own_row(fill, y - 1) + x, fill_own_row(fill, y) + x, fill_own_row(fill, y + 1) + x };
-	float z[FILL_PIECE], apart[FILL_PIECE];
-
-	memset(z, 0, sizeof z);
-	for (uint32_t i = 0; i < n; i++)
-		z[places->at[i]] = places->z[i];
-	fill->simd->fill_apart(apart, z, own, places->at[n - 1] + 1u);
-	for (uint32_t i = 0; i < n; i++) {
-		const float limit = plan->perspective ? along * places->z[i] : along;
-
-		if (places->weight[i] < WEIGHT_ONE / 2 && places->z[i] < INFINITY && !(apart[places->at[i]] <= limit))
-			places->z[i] = note_depth(counts, fill, x + places->at[i], y, places->z[i]);
-	}
-}
-
 /* Writes the colours and depths of listed pixels of a row that begins at `first`. */
 static void write_pixels(const struct fill *fill, size_t first, const struct fill_places *places, uint32_t n)
 {
 	const struct fill_picture *p = &fill->picture;
 	const uint8_t *srgb = p->srgb;
 	uint8_t *rgb = p->rgb != NULL ? p->rgb + 3 * first : NULL;
-	const float unit = ldexpf(1, p->stack->exponent); /* the product is ldexpf's result, but twice as fast */
-	const int is_exact = isnormal(unit);
+	float to_world[2];
 
+	psr_power_factors(to_world, p->stack->exponent);
 	for (uint32_t i = 0; i < n && rgb != NULL; i++) {
 		const uint32_t at = places->at[i];
 
@@ -314,7 +176,7 @@ static void write_pixels(const struct fill *fill, size_t first, const struct fil
 	}
 	for (uint32_t i = 0; i < n && p->depth != NULL; i++)
 		if (places->weight[i] < WEIGHT_ONE / 2)
-			p->depth[first + places->at[i]] = is_exact ? places->z[i] * unit : ldexpf(places->z[i], p->stack->exponent);
+			p->depth[first + places->at[i]] = places->z[i] * to_world[0] * to_world[1];
 }
 
 void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx0, uint32_t bx1, uint32_t by,
@@ -344,7 +206,7 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 				continue;
 			if (was.weight == pixels.weight)
 				memcpy(fill->picture.weight + first, was.weight, n_pixels * sizeof *was.weight);
-			note_depths(counts, fill, x, y, &places, n);
+			fill_note_depths(counts, fill, x, y, &places, n);
 			write_pixels(fill, first, &places, n);
 			counts->n_changed += n;
 			counts->n_filled += places.n_filled;

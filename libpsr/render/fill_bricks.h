@@ -1,9 +1,12 @@
-/* Pull and push of bricks, for fill.c. */
+/* Pull and push of bricks, and how far filled pixels are from samples, for fill.c. */
 #ifndef PSR_RENDER_FILL_BRICKS_H
 #define PSR_RENDER_FILL_BRICKS_H
 
 #include <stddef.h>
 #include "fill.h"
+
+/* Pixels of a row in one call. Row by row: shorter steps defeat the prefetcher, and a pull takes a quarter longer. */
+#define FILL_PIECE 256
 
 static inline struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y)
 {
@@ -62,6 +65,19 @@ struct fill_counts {
 	uint32_t n_changed, n_filled, n_far;
 	float reach;
 };
+
+/* Notes in `own` the samples that pixels of bricks bx0..bx1-1 show, while their weights are there; forgets those that an
+ * earlier picture had in a brick. */
+void fill_note_own(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by);
+void fill_forget_own(struct fill *fill, uint32_t bx, uint32_t by);
+
+/* Notes how far listed pixels of a row that begins at (x, y) are from samples, and changes the depths that fill.h says
+ * another surface's pixels are to have. */
+void fill_note_depths(struct fill_counts *counts, const struct fill *fill, uint32_t x, uint32_t y,
+                      struct fill_places *places, uint32_t n);
+
+/* Adds what was noted to the bound of the frame's error. */
+void fill_add_error(struct psr_report *report, const struct fill *fill);
 
 /* Pushes to their pixels. Adds to the counts. */
 void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx0, uint32_t bx1, uint32_t by,
