@@ -17,10 +17,11 @@ void octree_codes_end(struct codes_job *job)
 
 uint32_t codes_count(const struct codes_job *job)
 {
-	const struct octree_level *above = &job->levels->at[job->level - 1];
+	const struct octree_level *above;
 
 	if (job->level == 0)
 		return job->levels->n_roots;
+	above = &job->levels->at[job->level - 1];
 	return above->first[above->n - 1] + octree_count(above->code[above->n - 1]);
 }
 
