@@ -25,8 +25,8 @@ static inline uint32_t psr_bits_from_float(float f)
 	return bits;
 }
 
-/* Splits 2^exponent into two factors, since it may not fit a float: x * factor[0] * factor[1] is exact unless the result
- * does not fit. */
+/* Splits 2^exponent into two factors, since it may not fit a float: x * factor[0] * factor[1] is exact unless the
+ * result does not fit. */
 static inline void psr_power_factors(float factor[2], int exponent)
 {
 	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;

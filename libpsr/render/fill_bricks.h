@@ -66,8 +66,8 @@ struct fill_counts {
 	float reach;
 };
 
-/* Notes in `own` the samples that pixels of bricks bx0..bx1-1 show, while their weights are there; forgets those that an
- * earlier picture had in a brick. */
+/* Notes in `own` the samples that pixels of bricks bx0..bx1-1 show, while their weights are there; forgets those that
+ * an earlier picture had in a brick. */
 void fill_note_own(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by);
 void fill_forget_own(struct fill *fill, uint32_t bx, uint32_t by);
 
