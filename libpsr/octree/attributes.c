@@ -72,16 +72,15 @@ static unsigned count_of(const struct job *job)
 	return job->n < COUNTS - 1 ? job->n : COUNTS - 1;
 }
 
-static void find_near(struct job *job, uint32_t leaf, const struct octree_near *near)
+static void find_near(struct job *job, const struct octree_near *near)
 {
 	job->n = 0;
 	job->weight = 0;
-	for (int k = 0; k < OCTREE_NEAR; k++) {
-		const int x = k % 3 - 1, y = k / 3 % 3 - 1, z = k / 9 - 1, weight = 4 - x * x - y * y - z * z;
+	for (uint32_t left = near->before; left != 0; left &= left - 1) {
+		const int k = __builtin_ctz(left), x = k % 3 - 1, y = k / 3 % 3 - 1, z = k / 9 - 1;
+		const int weight = 4 - x * x - y * y - z * z;
 
-		if (near->at[k] >= leaf) /* as OCTREE_NONE is */
-			continue;
-		job->near[job->n++] = (struct near_leaf){ near->at[k], weight, { x, y, z } };
+		job->near[job->n++] = (struct near_leaf){ octree_near_at(near, (unsigned)k), weight, { x, y, z } };
 		job->weight += weight;
 	}
 }
@@ -315,7 +314,7 @@ static void visit_normal(uint32_t leaf, uint64_t path, const struct octree_near 
 {
 	struct job *job = userdata;
 
-	find_near(job, leaf, near);
+	find_near(job, near);
 	code_normal(job, leaf, path);
 	job->last_path = path;
 }
@@ -323,21 +322,21 @@ static void visit_normal(uint32_t leaf, uint64_t path, const struct octree_near 
 static void visit_offset(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
-	find_near(userdata, leaf, near);
+	find_near(userdata, near);
 	code_offset(userdata, leaf);
 }
 
 static void visit_color(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
-	find_near(userdata, leaf, near);
+	find_near(userdata, near);
 	code_color(userdata, leaf);
 }
 
 static void visit_material(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
-	find_near(userdata, leaf, near);
+	find_near(userdata, near);
 	code_material(userdata, leaf);
 }
 

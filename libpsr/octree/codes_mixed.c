@@ -14,35 +14,6 @@
 
 #define ALWAYS static inline __attribute__((always_inline))
 
-/* What follows is of a constant neighbour or octant, in loops that the compiler unrolls. */
-ALWAYS int step_of(unsigned k, int axis)
-{
-	return (int)(axis == 0 ? k % 3 : axis == 1 ? k / 3 % 3 : k / 9) - 1;
-}
-
-/* The octants of neighbour k that touch the node. */
-ALWAYS unsigned side_of(unsigned k)
-{
-	const int x = step_of(k, 0), y = step_of(k, 1), z = step_of(k, 2);
-
-	return (x < 0 ? 0xaau : x > 0 ? 0x55u : 0xffu) & (y < 0 ? 0xccu : y > 0 ? 0x33u : 0xffu) &
-	       (z < 0 ? 0xf0u : z > 0 ? 0x0fu : 0xffu);
-}
-
-/* Where neighbour k's children are in the node's neighbourhood; bits that leave it do not touch. */
-ALWAYS uint64_t shift_to(uint64_t spread, unsigned k)
-{
-	const int up = 21 + 2 * (step_of(k, 0) + 4 * step_of(k, 1) + 16 * step_of(k, 2));
-
-	return up >= 0 ? spread << up : spread >> -up;
-}
-
-/* Where octant j's window begins. */
-ALWAYS unsigned corner_of(unsigned j)
-{
-	return (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2);
-}
-
 /* Which neighbours of its parent octant j touches, with the parent itself. */
 ALWAYS uint32_t touched_by(unsigned j, uint32_t there)
 {
@@ -75,12 +46,12 @@ ALWAYS unsigned gather_far(uint64_t x)
 /* ---- a bit ---- */
 
 /* What a probability was wrong by goes into it by 1 / (count + 2), and the count goes up. Modulo 2^32. */
-ALWAYS void learn(const struct codes_model *model, uint32_t *p, unsigned bit)
+ALWAYS uint32_t learn(const struct codes_model *model, uint32_t was, unsigned bit)
 {
-	const uint32_t was = *p, count = was & 1023;
+	const uint32_t count = was & 1023;
 	const int32_t wrong = (int32_t)(bit << 22) - (int32_t)(was >> 10);
 
-	*p = was + (((uint32_t)(wrong >> 4) * model->part[count]) & ~1023u) + model->more[count];
+	return was + (((uint32_t)(wrong >> 4) * model->part[count]) & ~1023u) + model->more[count];
 }
 
 ALWAYS int32_t held(int32_t x)
@@ -88,46 +59,22 @@ ALWAYS int32_t held(int32_t x)
 	return x < -2047 ? -2047 : x > 2047 ? 2047 : x;
 }
 
-/* What a bit is foretold by. The last contexts and all parts are there where nodes are not sparse. */
-struct bases {
-	uint32_t *p[CONTEXTS];
-	int16_t *part[OWN_PARTS];
-	int32_t sum;
-	unsigned set; /* of weights */
-	words logit;
-	int32_t share; /* of a 1, in 65536ths */
-};
-
-ALWAYS void mix(struct bases *bases, const struct codes_model *model, int is_sparse)
+ALWAYS int32_t share_of(const struct codes_model *model, words logit, unsigned set)
 {
-	bases->logit = (words){ model->logit[*bases->p[0] >> 20],
-		                    model->logit[*bases->p[1] >> 20],
-		                    is_sparse ? 0 : model->logit[*bases->p[2] >> 20],
-		                    is_sparse ? 0 : model->logit[*bases->p[3] >> 20],
-		                    is_sparse ? 0 : model->logit[*bases->p[4] >> 20],
-		                    256,
-		                    (int16_t)bases->sum,
-		                    0 };
-	bases->share = model->share[2048 + held(words_weigh(bases->logit, model->weight[bases->set]) >> 13)];
+	return model->share[2048 + held(words_weigh(logit, model->weight[set]) >> 13)];
 }
 
-/* Returns what the parts of this octant change by. */
-ALWAYS int16_t learn_bit(struct codes_model *model, const struct bases *bases, int is_sparse, unsigned bit)
+ALWAYS void learn_weights(struct codes_model *model, words logit, unsigned set, int32_t share, unsigned bit)
 {
-	const int32_t one = (int32_t)(bit << 16);
-	const int16_t step = (int16_t)(((one - model->share[2048 + bases->sum]) * PART_LEARN + 32768) >> 16);
-	words *weight = &model->weight[bases->set];
+	words *weight = &model->weight[set];
 
-#pragma GCC unroll 8
-	for (int i = 0; i < OWN_PARTS; i++)
-		if (!is_sparse)
-			*bases->part[i] = word_held(*bases->part[i] + step);
-	*weight = words_learn(*weight, bases->logit, (int16_t)(((one - bases->share) * LEARN + 128) >> 8));
-#pragma GCC unroll 8
-	for (int i = 0; i < CONTEXTS; i++)
-		if (!is_sparse || i < SPARSE_CONTEXTS)
-			learn(model, bases->p[i], bit);
-	return step;
+	*weight = words_learn(*weight, logit, (int16_t)((((int32_t)(bit << 16) - share) * LEARN + 128) >> 8));
+}
+
+/* Returns what the parts of a sum change by. */
+ALWAYS int16_t part_step(const struct codes_model *model, int32_t sum, unsigned bit)
+{
+	return (int16_t)((((int32_t)(bit << 16) - model->share[2048 + sum]) * PART_LEARN + 32768) >> 16);
 }
 
 static inline uint32_t scatter(uint64_t x, int bits)
@@ -146,26 +93,22 @@ struct around {
 	uint32_t there;              /* which neighbours there are, and itself */
 	uint64_t known;              /* children of neighbours that come earlier, and own ones so far */
 	uint64_t behind;             /* the same, of a cube whose far end are its own */
-	unsigned code[OCTREE_NEAR];  /* of neighbours that come earlier */
+	uint8_t code[OCTREE_NEAR];   /* of neighbours that come earlier; 0 of others */
 	int row;                     /* how far above the leaves */
 };
 
-ALWAYS void look_around(struct around *around, const struct codes_model *model, const uint8_t *codes, uint32_t node,
-                        const struct octree_near *near, int is_sparse)
-{
-	*around = (struct around){ .row = around->row };
-#pragma GCC unroll 27
-	for (unsigned k = 0; k < OCTREE_NEAR; k++) {
-		const int x = step_of(k, 0), y = step_of(k, 1), z = step_of(k, 2);
-		const uint32_t at = near->at[k], earlier = -(uint32_t)(at < node); /* all bits, or none: no branch */
+#define BEHIND 0x161bu /* neighbours that are not ahead along any axis */
 
-		around->there |= (uint32_t)(at != OCTREE_NONE) << k;
-		if (x >= 0 && y >= 0 && z >= 0) /* it comes later */
-			continue;
-		around->code[k] = codes[at & earlier] & earlier;
-		around->known |= shift_to(model->spread[around->code[k] & side_of(k)], k);
-		if (x <= 0 && y <= 0 && z <= 0 && !is_sparse)
-			around->behind |= model->spread[around->code[k]] << (2 * (x + 1) + 8 * (y + 1) + 32 * (z + 1));
+ALWAYS void look_around(struct around *around, const uint8_t *codes, const struct octree_near *near, int is_sparse)
+{
+	around->there = near->there;
+	for (uint32_t left = near->before; left != 0; left &= left - 1) {
+		const unsigned k = (unsigned)__builtin_ctz(left), code = codes[octree_near_at(near, k)];
+
+		around->code[k] = (uint8_t)code;
+		around->known |= octree_cube_of(code, k);
+		if (!is_sparse)
+			around->behind |= octree_cube[code] << (octree_turn[k] + 21) % 64 & -(uint64_t)(BEHIND >> k & 1);
 	}
 }
 
@@ -197,7 +140,7 @@ ALWAYS void find_slots(uint32_t *b[8], uint32_t *d[8], struct codes_model *model
 {
 #pragma GCC unroll 4
 	for (unsigned j = first; j < first + 4; j++) {
-		const uint64_t window = around->known >> corner_of(j) & WINDOW;
+		const uint64_t window = around->known >> octree_corner(j) & WINDOW;
 		const uint64_t key = window << 3 | j;
 		const uint64_t more = (uint64_t)touched_by(j, around->there) << 50 ^ (uint64_t)around->row << 48;
 
@@ -210,107 +153,209 @@ ALWAYS void find_slots(uint32_t *b[8], uint32_t *d[8], struct codes_model *model
 	}
 }
 
-/* A node whose code is under way. */
+/* A node whose code is under way. faces, b: where nodes are not sparse. */
 struct coding {
 	struct around around;
 	uint32_t faces, *b[8], *d[8], *e;
+	words *part[PLANES + CODES];
 	int16_t sum[8];
+	int16_t step[8]; /* what the parts of all octants change by */
 };
 
-/* Finds what octant j is foretold by, after so much of the code. */
-ALWAYS void foretell(struct bases *bases, struct codes_model *model, const struct coding *node, unsigned j,
-                     unsigned so_far, int is_sparse)
-{
-	const unsigned corner = corner_of(j), of_half = j < 4 ? so_far : so_far >> 4;
-	const uint64_t window = node->around.known >> corner, behind = node->around.behind >> corner;
-
-	bases->p[0] = node->d[j] + of_half;
-	bases->p[1] = &node->e[j];
-	bases->set = model->set_by_d[*bases->p[0] & 1023] + model->set_by_e[*bases->p[1] & 1023] + 2 * j + (so_far != 0);
-	bases->sum = node->sum[j];
-	if (!is_sparse) {
-		const unsigned near_ones = gather_near(behind >> 21), far_ones = gather_far(behind);
-
-		bases->p[2] = &model->a[node->faces << 8 | 1u << j | so_far];
-		bases->p[3] = node->b[j] + of_half;
-		bases->p[4] = &model->f[j << 14 | near_ones << 7 | far_ones];
-		bases->part[0] = &model->of_own[j][so_far];
-		bases->part[1] = &model->of_window[j][0][window & PLANE];
-		bases->part[2] = &model->of_window[j][1][window >> 16 & PLANE];
-		bases->part[3] = &model->of_near[j][near_ones];
-		bases->part[4] = &model->of_far[j][far_ones];
-#pragma GCC unroll 8
-		for (int i = 0; i < OWN_PARTS; i++)
-			bases->sum += *bases->part[i];
-		bases->sum = held(bases->sum >> 4);
-	}
-	mix(bases, model, is_sparse);
-}
-
-ALWAYS void code_node(struct codes_job *job, uint32_t at, const struct octree_near *near, int is_decoding,
-                      int is_sparse)
+ALWAYS void begin_node(struct coding *node, struct codes_job *job, const struct octree_near *near, int is_sparse)
 {
 	struct codes_model *model = job->model;
-	const struct octree_level *level = &job->levels->at[job->level];
-	const unsigned code = is_decoding ? 0 : level->code[at];
 	const int up = job->levels->height - 1 - job->level;
-	/* To wait for a bit takes longer than to find what the next one is foretold by for both. */
-	const int is_both = is_decoding && is_sparse;
-	struct coding node = { .around.row = up < 3 ? up : 3 };
-	words *part[PLANES + CODES], sums = { 0 };
-	int16_t step[8] = { 0 };
-	struct bases bases[8][2];
+	words sums = { 0 };
+
+	*node = (struct coding){ .around.row = up < 3 ? up : 3 };
+	look_around(&node->around, job->levels->at[job->level].code, near, is_sparse);
+	node->e = &model->e[scatter((uint64_t)node->around.there * 0x100000001b3u, E_BITS - 3) << 3];
+	__builtin_prefetch(node->e, 1);
+	find_slots(node->b, node->d, model, &node->around, 0, is_sparse);
+	find_parts(node->part, model, &node->around);
+#pragma GCC unroll 21
+	for (int i = 0; i < PLANES + CODES; i++)
+		sums = words_add(sums, *node->part[i]);
+	if (is_sparse)
+		sums >>= 4;
+	memcpy(node->sum, &sums, sizeof sums);
+}
+
+ALWAYS void end_node(const struct coding *node)
+{
+	words step;
+
+	memcpy(&step, node->step, sizeof step);
+#pragma GCC unroll 21
+	for (int i = 0; i < PLANES + CODES; i++)
+		*node->part[i] = words_add(*node->part[i], step);
+}
+
+/* ---- a node that is not sparse ---- */
+
+ALWAYS unsigned code_bit(struct coding *node, struct codes_model *model, struct coder *coder, unsigned j,
+                         unsigned so_far, int is_decoding, unsigned bit)
+{
+	const unsigned corner = octree_corner(j), of_half = j < 4 ? so_far : so_far >> 4;
+	const uint64_t window = node->around.known >> corner, behind = node->around.behind >> corner;
+	const unsigned near_ones = gather_near(behind >> 21), far_ones = gather_far(behind);
+	uint32_t *const p[CONTEXTS] = { node->d[j] + of_half, &node->e[j], &model->a[node->faces << 8 | 1u << j | so_far],
+		                            node->b[j] + of_half, &model->f[j << 14 | near_ones << 7 | far_ones] };
+	int16_t *const part[OWN_PARTS] = { &model->of_own[j][so_far], &model->of_window[j][0][window & PLANE],
+		                               &model->of_window[j][1][window >> 16 & PLANE], &model->of_near[j][near_ones],
+		                               &model->of_far[j][far_ones] };
+	const unsigned set = model->set_by_d[*p[0] & 1023] + model->set_by_e[*p[1] & 1023] + 2 * j + (so_far != 0);
+	int32_t sum = node->sum[j], share;
+	words logit;
+
+#pragma GCC unroll 8
+	for (int i = 0; i < OWN_PARTS; i++)
+		sum += *part[i];
+	sum = held(sum >> 4);
+	logit = (words){ model->logit[*p[0] >> 20], model->logit[*p[1] >> 20], model->logit[*p[2] >> 20],
+		             model->logit[*p[3] >> 20], model->logit[*p[4] >> 20], 256, (int16_t)sum, 0 };
+	share = share_of(model, logit, set);
+	bit = coder_bit(coder, is_decoding, (uint32_t)share, bit);
+	node->step[j] = part_step(model, sum, bit);
+#pragma GCC unroll 8
+	for (int i = 0; i < OWN_PARTS; i++)
+		*part[i] = word_held(*part[i] + node->step[j]);
+	learn_weights(model, logit, set, share, bit);
+#pragma GCC unroll 8
+	for (int i = 0; i < CONTEXTS; i++)
+		*p[i] = learn(model, *p[i], bit);
+	node->around.known |= (uint64_t)bit << (corner + 21);
+	node->around.behind |= (uint64_t)bit << (corner + 42);
+	return bit;
+}
+
+ALWAYS void code_dense(struct codes_job *job, uint32_t at, const struct octree_near *near, int is_decoding)
+{
+	uint8_t *const code = &job->levels->at[job->level].code[at];
+	struct coder coder = *job->coder; /* in registers */
+	struct coding node;
+	unsigned so_far = 0;
+
+	begin_node(&node, job, near, 0);
+	node.faces = faces_of(near->there);
+#pragma GCC unroll 8
+	for (unsigned j = 0; j < 8; j++) {
+		if (j == 7 && so_far == 0) { /* no code is 0 */
+			so_far = 128;
+			break;
+		}
+		if (j == 4)
+			find_slots(node.b, node.d, job->model, &node.around, 4, 0);
+		so_far |= code_bit(&node, job->model, &coder, j, so_far, is_decoding, is_decoding ? 0 : *code >> j & 1) << j;
+	}
+	end_node(&node);
+	*job->coder = coder;
+	if (is_decoding)
+		*code = (uint8_t)so_far;
+}
+
+/* ---- a sparse node ---- */
+
+/* What the bit of an octant is foretold by; [1]: if the bit before it is 1. */
+struct guess {
+	uint32_t d[2], e; /* probabilities */
+	unsigned set[2];
+	int32_t share[2];
+	words logit;      /* d's is missing */
+};
+
+ALWAYS words with_d(const struct guess *guess, const struct codes_model *model, unsigned which)
+{
+	words logit = guess->logit;
+
+	logit[0] = model->logit[guess->d[which] >> 20];
+	return logit;
+}
+
+ALWAYS void guess_octant(struct guess *guess, const struct codes_model *model, const struct coding *node, unsigned j)
+{
+	guess->e = node->e[j];
+	guess->logit = (words){ 0, model->logit[guess->e >> 20], 0, 0, 0, 256, node->sum[j], 0 };
+	guess->set[0] = guess->set[1] = model->set_by_e[guess->e & 1023] + 2 * j;
+}
+
+ALWAYS void guess_d(struct guess *guess, const struct codes_model *model, const struct coding *node, unsigned j,
+                    unsigned so_far, unsigned which)
+{
+	guess->d[which] = node->d[j][j < 4 ? so_far : so_far >> 4];
+	guess->set[which] += model->set_by_d[guess->d[which] & 1023] + (so_far != 0);
+}
+
+ALWAYS void guess_bit(struct guess *guess, const struct codes_model *model, const struct coding *node, unsigned j,
+                      unsigned so_far, unsigned which)
+{
+	guess_octant(guess, model, node, j);
+	guess_d(guess, model, node, j, so_far, which);
+	guess->share[which] = share_of(model, with_d(guess, model, which), guess->set[which]);
+}
+
+ALWAYS void guess_both(struct guess *guess, const struct codes_model *model, const struct coding *node, unsigned j,
+                       unsigned so_far)
+{
+	int32_t x[2];
+
+	guess_octant(guess, model, node, j);
+	guess_d(guess, model, node, j, so_far, 0);
+	guess_d(guess, model, node, j, so_far | 1u << (j - 1), 1);
+	words_weigh_both(x, with_d(guess, model, 0), model->weight[guess->set[0]], with_d(guess, model, 1),
+	                 model->weight[guess->set[1]]);
+	guess->share[0] = model->share[2048 + x[0]];
+	guess->share[1] = model->share[2048 + x[1]];
+}
+
+/* To wait for a bit takes longer than to find what the next one is foretold by for both: so does decoding. */
+ALWAYS void code_sparse(struct codes_job *job, uint32_t at, const struct octree_near *near, int is_decoding)
+{
+	struct codes_model *model = job->model;
+	uint8_t *const code = &job->levels->at[job->level].code[at];
 	struct coder coder = *job->coder; /* in registers */
 	unsigned so_far = 0, bit = 0;
 	const uint32_t *learnt = NULL; /* of the octant before, with which one may share its place */
+	struct guess guess[8];
+	struct coding node;
 
-	look_around(&node.around, model, level->code, at, near, is_sparse);
-	node.e = &model->e[scatter((uint64_t)node.around.there * 0x100000001b3u, E_BITS - 3) << 3];
-	__builtin_prefetch(node.e, 1);
-	find_slots(node.b, node.d, model, &node.around, 0, is_sparse);
-	find_parts(part, model, &node.around);
-#pragma GCC unroll 21
-	for (int i = 0; i < PLANES + CODES; i++)
-		sums = words_add(sums, *part[i]);
-	if (is_sparse)
-		sums >>= 4;
-	memcpy(node.sum, &sums, sizeof sums);
-	node.faces = faces_of(node.around.there);
+	begin_node(&node, job, near, 1);
 #pragma GCC unroll 8
 	for (unsigned j = 0; j < 8; j++) {
-		const int is_foretold = is_both && j % 4 != 0;
-		struct bases *now = &bases[j][is_foretold ? bit : 0];
+		const int is_both = is_decoding && j % 4 != 0;
+		const unsigned which = is_both ? bit : 0;
+		uint32_t *d;
 		int32_t share;
 
 		if (j == 7 && so_far == 0) { /* no code is 0 */
 			so_far = 128;
 			break;
 		}
-		if (j == 4)
-			find_slots(node.b, node.d, model, &node.around, 4, is_sparse);
-		if (!is_foretold || now->p[0] == learnt)
-			foretell(now, model, &node, j, so_far, is_sparse);
-		share = bases[j][0].share;
-		if (is_foretold) /* without waiting for memory */
-			share ^= (share ^ bases[j][1].share) & -(int32_t)bit;
-		if (is_both && j % 4 != 3) {
-			foretell(&bases[j + 1][0], model, &node, j + 1, so_far, is_sparse);
-			foretell(&bases[j + 1][1], model, &node, j + 1, so_far | 1u << j, is_sparse);
+		if (j == 4) {
+			node.around.known |= octree_cube_of(so_far, OCTREE_SELF);
+			find_slots(node.b, node.d, model, &node.around, 4, 1);
 		}
-		bit = coder_bit(&coder, is_decoding, (uint32_t)share, code >> j & 1);
+		d = node.d[j] + (j < 4 ? so_far : so_far >> 4);
+		if (!is_both || d == learnt)
+			guess_bit(&guess[j], model, &node, j, so_far, which);
+		share = guess[j].share[0];
+		if (is_both) /* without waiting for memory */
+			share ^= (share ^ guess[j].share[1]) & -(int32_t)bit;
+		if (is_decoding && j % 4 != 3)
+			guess_both(&guess[j + 1], model, &node, j + 1, so_far);
+		bit = coder_bit(&coder, is_decoding, (uint32_t)share, is_decoding ? 0 : *code >> j & 1);
 		so_far |= bit << j;
-		step[j] = learn_bit(model, now, is_sparse, bit);
-		learnt = now->p[0];
-		node.around.known |= (uint64_t)bit << (corner_of(j) + 21);
-		node.around.behind |= (uint64_t)bit << (corner_of(j) + 42);
+		node.step[j] = part_step(model, node.sum[j], bit);
+		learn_weights(model, with_d(&guess[j], model, which), guess[j].set[which], guess[j].share[which], bit);
+		*d = learn(model, guess[j].d[which], bit);
+		node.e[j] = learn(model, guess[j].e, bit);
+		learnt = d;
 	}
-	memcpy(&sums, step, sizeof sums);
-#pragma GCC unroll 21
-	for (int i = 0; i < PLANES + CODES; i++)
-		*part[i] = words_add(*part[i], sums);
+	end_node(&node);
 	*job->coder = coder;
 	if (is_decoding)
-		level->code[at] = (uint8_t)so_far;
+		*code = (uint8_t)so_far;
 }
 
 /* ---- a level ---- */
@@ -318,27 +363,27 @@ ALWAYS void code_node(struct codes_job *job, uint32_t at, const struct octree_ne
 static void pack_dense(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
-	code_node(userdata, node, near, 0, 0);
+	code_dense(userdata, node, near, 0);
 }
 
 static void pack_sparse(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
-	code_node(userdata, node, near, 0, 1);
+	code_sparse(userdata, node, near, 0);
 }
 
 static void unpack_dense(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
 	if (!((struct codes_job *)userdata)->coder->has_failed)
-		code_node(userdata, node, near, 1, 0);
+		code_dense(userdata, node, near, 1);
 }
 
 static void unpack_sparse(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	(void)path;
 	if (!((struct codes_job *)userdata)->coder->has_failed)
-		code_node(userdata, node, near, 1, 1);
+		code_sparse(userdata, node, near, 1);
 }
 
 void codes_mixed_level(struct codes_job *job, int is_decoding)

@@ -41,12 +41,6 @@ static void make_counts(struct codes_model *model)
 
 static void make_places(struct codes_model *model)
 {
-	for (unsigned code = 0; code < 256; code++) {
-		model->spread[code] = 0;
-		for (unsigned j = 0; j < 8; j++)
-			if (code >> j & 1)
-				model->spread[code] |= (uint64_t)1 << ((j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2));
-	}
 	for (unsigned plane = 0; plane < 512; plane++) {
 		model->across[plane] = 0;
 		for (unsigned i = 0; i < 9; i++)

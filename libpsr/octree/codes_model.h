@@ -30,8 +30,6 @@ struct codes_model {
 	/* By a count: 1 / (count + 2), in 2^-14; what it goes up by; which weights to use, of two contexts. */
 	uint32_t part[COUNTS + 1];
 	uint8_t more[COUNTS + 1], set_by_d[COUNTS + 1], set_by_e[COUNTS + 1];
-	/* A node's neighbourhood is a cube of 4x4x4 children, bit x + 4 y + 16 z: its own are in the middle. */
-	uint64_t spread[256];      /* a code's bits at 0 and 1 of each axis */
 	uint32_t across[512];      /* a plane's columns: 3 bits at 0, 10 and 20 each */
 };
 

@@ -32,6 +32,15 @@ static inline int32_t words_weigh_c(words logit, words weight)
 	return x;
 }
 
+/* Two such sums / 2^13, each held within -2047..2047. */
+static inline void words_weigh_both_c(int32_t x[2], words logit0, words weight0, words logit1, words weight1)
+{
+	x[0] = words_weigh_c(logit0, weight0) >> 13;
+	x[1] = words_weigh_c(logit1, weight1) >> 13;
+	for (int i = 0; i < 2; i++)
+		x[i] = x[i] < -2047 ? -2047 : x[i] > 2047 ? 2047 : x[i];
+}
+
 /* weight + (logit / 2^12 * step) / 2, each rounded down but for the last, which is rounded. Logits as above. */
 static inline words words_learn_c(words weight, words logit, int16_t step)
 {
@@ -54,6 +63,20 @@ static inline int32_t words_weigh(words logit, words weight)
 	return _mm_cvtsi128_si32(_mm_add_epi32(y, _mm_shuffle_epi32(y, 0xb1)));
 }
 
+static inline void words_weigh_both(int32_t x[2], words logit0, words weight0, words logit1, words weight1)
+{
+	const __m128i a = _mm_madd_epi16((__m128i)logit0, (__m128i)weight0);
+	const __m128i b = _mm_madd_epi16((__m128i)logit1, (__m128i)weight1);
+	const __m128i halves = _mm_add_epi32(_mm_unpacklo_epi32(a, b), _mm_unpackhi_epi32(a, b));
+	const __m128i sums = _mm_srai_epi32(_mm_add_epi32(halves, _mm_shuffle_epi32(halves, 0x4e)), 13);
+	const __m128i held = _mm_max_epi16(_mm_min_epi16(_mm_packs_epi32(sums, sums), _mm_set1_epi16(2047)),
+	                                   _mm_set1_epi16(-2047));
+	const int32_t both = _mm_cvtsi128_si32(held);
+
+	x[0] = (int16_t)both;
+	x[1] = both >> 16;
+}
+
 static inline words words_learn(words weight, words logit, int16_t step)
 {
 	const __m128i x = _mm_mulhi_epi16(_mm_slli_epi16((__m128i)logit, 4), _mm_set1_epi16(step));
@@ -63,6 +86,7 @@ static inline words words_learn(words weight, words logit, int16_t step)
 #else
 #define words_add words_add_c
 #define words_weigh words_weigh_c
+#define words_weigh_both words_weigh_both_c
 #define words_learn words_learn_c
 #endif
 

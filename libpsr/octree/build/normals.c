@@ -95,9 +95,12 @@ static void find_normal(uint32_t cell, uint64_t path, const struct octree_near *
 	int least = 0;
 
 	(void)path;
-	for (int k = 0; k < OCTREE_NEAR; k++)
-		if (near->at[k] != OCTREE_NONE)
-			add_moments(sum, &s->moments[near->at[k]], (const int[3]){ k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1 });
+	for (uint32_t left = near->there; left != 0; left &= left - 1) {
+		const int k = __builtin_ctz(left);
+
+		add_moments(sum, &s->moments[octree_near_at(near, (unsigned)k)],
+		            (const int[3]){ k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1 });
+	}
 	for (int c = 0, k = 4; c < 3; c++)
 		for (int d = c; d < 3; d++, k++)
 			m[c][d] = m[d][c] = sum[k] - sum[1 + c] * sum[1 + d] / sum[0];
@@ -128,13 +131,11 @@ static void join(uint32_t cell, uint64_t path, const struct octree_near *near, v
 	struct normals *s = userdata;
 
 	(void)path;
-	for (int k = OCTREE_SELF + 1; k < OCTREE_NEAR; k++) {
-		const uint32_t other = near->at[k];
+	for (uint32_t left = near->there >> (OCTREE_SELF + 1) << (OCTREE_SELF + 1); left != 0; left &= left - 1) {
+		const uint32_t other = octree_near_at(near, (unsigned)__builtin_ctz(left));
 		uint32_t a, b;
 		float agreement;
 
-		if (other == OCTREE_NONE)
-			continue;
 		agreement = s->normal[cell][0] * s->normal[other][0] + s->normal[cell][1] * s->normal[other][1] +
 		            s->normal[cell][2] * s->normal[other][2];
 		if (fabsf(agreement) < s->least)
@@ -209,14 +210,14 @@ struct setting {
  * other side of a wall does, has no part in it, and one beyond an edge less. */
 static void blend(float normal[3], const struct setting *set, const float place[3])
 {
-	static const int step[3] = { 1, 3, 9 };
+	static const unsigned step[3] = { 1, 3, 9 };
 	const struct normals *s = set->normals;
-	const float *own = s->normal[set->near->at[OCTREE_SELF]];
+	const float *own = s->normal[octree_near_at(set->near, OCTREE_SELF)];
 
 	for (int c = 0; c < 3; c++)
 		normal[c] = 0.0f;
 	for (int k = 0; k < 8; k++) {
-		int near = OCTREE_SELF;
+		unsigned near = OCTREE_SELF;
 		float weight = 1.0f, agreement = 0.0f;
 
 		for (int c = 0; c < 3; c++) {
@@ -225,9 +226,9 @@ static void blend(float normal[3], const struct setting *set, const float place[
 			near += !(k >> c & 1) ? 0 : place[c] < 0.0f ? -step[c] : step[c];
 			weight *= k >> c & 1 ? away : 1.0f - away;
 		}
-		if (set->near->at[near] == OCTREE_NONE)
+		if (!(set->near->there >> near & 1))
 			continue;
-		const float *other = s->normal[set->near->at[near]];
+		const float *other = s->normal[octree_near_at(set->near, near)];
 
 		for (int c = 0; c < 3; c++)
 			agreement += own[c] * other[c];

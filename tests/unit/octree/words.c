@@ -77,6 +77,28 @@ static void logits_are_weighed_without_loss(void **state)
 	}
 }
 
+static void two_sums_are_those_of_each(void **state)
+{
+	uint64_t random = 4;
+
+	(void)state;
+	for (int n = 0; n < TRIES; n++) {
+		const words logit[2] = { any_logits(&random), any_logits(&random) };
+		/* Small weights, too, since most of the others are held. */
+		const words weight[2] = { any_words(&random), any_words(&random) >> n % 8 };
+		int32_t x[2], in_c[2];
+
+		words_weigh_both(x, logit[0], weight[0], logit[1], weight[1]);
+		words_weigh_both_c(in_c, logit[0], weight[0], logit[1], weight[1]);
+		for (int i = 0; i < 2; i++) {
+			const int64_t wide = floor_shift(words_weigh_c(logit[i], weight[i]), 13);
+
+			assert_int_equal(x[i], wide < -2047 ? -2047 : wide > 2047 ? 2047 : wide);
+			assert_int_equal(in_c[i], x[i]);
+		}
+	}
+}
+
 static void weights_learn_the_same(void **state)
 {
 	uint64_t random = 3;
@@ -101,6 +123,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sums_are_held_at_their_ends),
 		cmocka_unit_test(logits_are_weighed_without_loss),
+		cmocka_unit_test(two_sums_are_those_of_each),
 		cmocka_unit_test(weights_learn_the_same),
 	};
 
