@@ -156,10 +156,10 @@ void fill_look(struct fill *fill, uint32_t row)
 			continue;
 		}
 		end = run_end(fill, fill->picture.bricks, bx, row, 0);
+		fill_note_own(fill, bx, end, row);
 		while (fill_pull_weights(fill, bx, end, row, level) < WEIGHT_ONE && level < fill->brick_top)
 			level++;
 		memset(pulled + bx, level, end - bx);
-		fill_note_own(fill, bx, end, row);
 		for (uint32_t b = bx; b < end; b++)
 			whole[b] = (uint8_t)whole_level(fill, b, row);
 	}

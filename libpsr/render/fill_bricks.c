@@ -34,25 +34,26 @@ static inline struct fill_row picture_row_at(struct picture_row *to, const struc
 	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z, NULL };
 }
 
-/* Weights and depths of the same pixels. */
+/* Weights and depths of the same pixels. is_own: `own` has the depths. */
 static inline struct fill_row picture_depths_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
-                                                uint32_t n)
+                                                uint32_t n, int is_own)
 {
 	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = fill->width, n_inside = y >= fill->height ? 0 : x + n > width ? width - x : n;
 	const size_t first = (size_t)y * width + x;
+	float *z = is_own ? fill_own_row(fill, y) + x : to->z;
 
-	if (n_inside)
-		fill->simd->fill_depths(to->z, psr_zstack_row(p->stack, y) + x, n_inside);
+	if (n_inside && !is_own)
+		fill->simd->fill_depths(z, psr_zstack_row(p->stack, y) + x, n_inside);
 	if (n_inside == n)
-		return (struct fill_row){ NULL, NULL, NULL, p->weight + first, to->z, NULL };
+		return (struct fill_row){ NULL, NULL, NULL, p->weight + first, z, NULL };
 	if (n_inside)
 		memcpy(to->weight, p->weight + first, n_inside * sizeof *to->weight);
 	for (uint32_t i = n_inside; i < n; i++) {
 		to->z[i] = NAN;
 		to->weight[i] = WEIGHT_ONE;
 	}
-	return (struct fill_row){ NULL, NULL, NULL, to->weight, to->z, NULL };
+	return (struct fill_row){ NULL, NULL, NULL, to->weight, z, NULL };
 }
 
 static uint32_t least_of(uint32_t a, uint32_t b)
@@ -82,6 +83,7 @@ uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32
 	const struct fill_level *to = &fill->level[level], *from = to - 1;
 	const struct cells c = cells_of(fill, bx0, bx1, by, level);
 	const float scale = fill_scale(fill->plan, level), offset = fill_offset(fill->plan, level);
+	const int is_own = fill->picture.bricks[by * fill->bricks_x + bx0];
 	struct picture_row rows[2];
 	uint16_t least = WEIGHT_ONE;
 
@@ -92,8 +94,8 @@ uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32
 
 			n = piece_of(c.x1 - x, level);
 			if (level == 1) {
-				upper = picture_depths_at(&rows[0], fill, 2 * x, 2 * y, 2 * n);
-				lower = picture_depths_at(&rows[1], fill, 2 * x, 2 * y + 1, 2 * n);
+				upper = picture_depths_at(&rows[0], fill, 2 * x, 2 * y, 2 * n, is_own);
+				lower = picture_depths_at(&rows[1], fill, 2 * x, 2 * y + 1, 2 * n, is_own);
 			} else {
 				upper = fill_row_at(from, (int32_t)(2 * x), (int32_t)(2 * y));
 				lower = fill_row_at(from, (int32_t)(2 * x), (int32_t)(2 * y + 1));

@@ -23,13 +23,6 @@ void fill_forget_own(struct fill *fill, uint32_t bx, uint32_t by)
 			fill_own_row(fill, y)[x] = NAN;
 }
 
-/* Where a filled pixel is: x and y from where the view axis meets the picture. */
-struct from {
-	float x, y, z;
-	float wider; /* the factor from another z' to how much wider pixels are there, 0 if orthographic; */
-	float steep; /* from a difference in z' to pixels */
-};
-
 /* What is at a filled pixel and around it. */
 struct beside {
 	float distance2; /* of the nearest, in pixels, INFINITY without any */
@@ -55,7 +48,7 @@ static float own_depth(const struct fill *fill, int32_t column, int32_t row)
 }
 
 /* Looks at a pixel dx and dy aside that shows a sample of depth z. */
-static void look_at(struct beside *beside, const struct from *from, int32_t dx, int32_t dy, float z)
+static void look_at(struct beside *beside, const struct fill_from *from, int32_t dx, int32_t dy, float z)
 {
 	const float apart = z - from->z, shift = apart * from->wider, along = fabsf(apart) * from->steep;
 	const float x = (float)dx + shift * (from->x + (float)dx), y = (float)dy + shift * (from->y + (float)dy);
@@ -72,19 +65,17 @@ static void look_at(struct beside *beside, const struct from *from, int32_t dx, 
 	}
 }
 
-/* Ends early where what is found is no farther than `enough`, and the pixel's depth stays. */
-static struct beside look_beside(const struct fill *fill, uint32_t x, uint32_t y, float z, float enough)
+/* Looks pixel by pixel. Ends early where what is found is no farther than `enough`, and the pixel's depth stays. */
+static struct beside look_beside(const struct fill *fill, const struct fill_from *from, uint32_t x, uint32_t y,
+                                 float enough)
 {
-	const struct plan *plan = fill->plan;
-	const struct from from = { (float)((double)x + 0.5 - plan->center[0]), (float)((double)y + 0.5 - plan->center[1]), z,
-		                       plan->perspective ? 1 / z : 0, plan->perspective ? plan->focal / z : plan->focal };
-	struct beside beside = { INFINITY, INFINITY, z, INFINITY, 0, 0 };
+	struct beside beside = { INFINITY, INFINITY, from->z, INFINITY, 0, 0 };
 	int32_t last = FILL_NEAR, first = FILL_NEAR;
 
 	for (int32_t ring = 0; ring <= last; ring++) {
 		for (int32_t dy = -ring; dy <= ring; dy++)
 			for (int32_t dx = -ring; dx <= ring; dx += abs(dy) == ring ? 1 : 2 * ring) {
-				look_at(&beside, &from, dx, dy, own_depth(fill, (int32_t)x + dx, (int32_t)y + dy));
+				look_at(&beside, from, dx, dy, own_depth(fill, (int32_t)x + dx, (int32_t)y + dy));
 				if (beside.distance2 <= enough * enough && beside.along <= FILL_APART)
 					return beside;
 			}
@@ -99,12 +90,60 @@ static struct beside look_beside(const struct fill *fill, uint32_t x, uint32_t y
 	return beside;
 }
 
+/* Whether the pixels of a square are of marked bricks, so that `own` has them all. */
+static int has_square(const struct fill *fill, uint32_t x, uint32_t y, uint32_t reach)
+{
+	const uint8_t *const upper = fill->picture.bricks + (y - reach) / BRICK * fill->bricks_x;
+	const uint8_t *const lower = fill->picture.bricks + (y + reach) / BRICK * fill->bricks_x;
+	const uint32_t left = (x - reach) / BRICK, right = (x + reach) / BRICK;
+
+	return x >= reach && y >= reach && x + reach < fill->width && y + reach < fill->height && upper[left]
+	       && upper[right] && lower[left] && lower[right];
+}
+
+/* As look_beside(), if a square of FILL_SQUARE pixels to each side tells; returns whether. */
+static int look_near(struct beside *beside, const struct fill *fill, const struct fill_from *from, uint32_t x,
+                     uint32_t y, float enough)
+{
+	const float *const own = fill_own_row(fill, y) + x;
+	const ptrdiff_t stride = (ptrdiff_t)fill->width + 2;
+	int first = *own < INFINITY ? 0 : FILL_NEAR, last = fabsf(*own - from->z) * from->steep <= FILL_APART ? 1 : FILL_NEAR;
+	struct fill_beside square;
+
+	for (int reach = 1; reach <= FILL_SQUARE && has_square(fill, x, y, (uint32_t)reach); reach++) {
+		square = fill->simd->fill_beside(from, own, stride, reach);
+		*beside = (struct beside){ .distance2 = square.distance2, .along = square.along };
+		if (square.along <= FILL_APART)
+			last = last < reach + 1 ? last : reach + 1;
+		if (reach == last || (square.along <= FILL_APART && square.distance2 <= enough * enough))
+			return 1;
+		if (reach == first + 1 && square.n >= FILL_MANY && square.along > FILL_APART) {
+			const struct fill_place place = fill->simd->fill_pick(from, own, stride, reach, square.along);
+
+			beside->z = own[place.y * stride + place.x];
+			beside->aside2 = (float)(place.x * place.x + place.y * place.y);
+			beside->is_among = 1;
+			return 1;
+		}
+		first = square.n > 0 && reach < first ? reach : first;
+	}
+	return 0;
+}
+
 /* Notes how far the depth that pixel (x, y) gets is from those of samples; returns the depth. */
 static float note_depth(struct fill_counts *counts, const struct fill *fill, uint32_t x, uint32_t y, float z)
 {
-	const struct beside beside = look_beside(fill, x, y, z, counts->reach);
-	const float reach = sqrtf(beside.is_among ? beside.aside2 : beside.distance2);
+	const struct plan *plan = fill->plan;
+	const struct fill_from from = {
+		(float)((double)x + 0.5 - plan->center[0]), (float)((double)y + 0.5 - plan->center[1]), z,
+		plan->perspective ? 1 / z : 0, plan->perspective ? plan->focal / z : plan->focal,
+	};
+	struct beside beside;
+	float reach;
 
+	if (!look_near(&beside, fill, &from, x, y, counts->reach))
+		beside = look_beside(fill, &from, x, y, counts->reach);
+	reach = sqrtf(beside.is_among ? beside.aside2 : beside.distance2);
 	if (beside.distance2 == INFINITY)
 		counts->n_far++;
 	else if (reach > counts->reach)
@@ -137,21 +176,22 @@ static float reach_along(const struct fill_counts *counts, const struct fill *fi
 void fill_note_depths(struct fill_counts *counts, const struct fill *fill, uint32_t x, uint32_t y,
                       struct fill_places *places, uint32_t n)
 {
-	const struct plan *plan = fill->plan;
-	const float along = reach_along(counts, fill) / plan->focal;
+	const float along = reach_along(counts, fill) / fill->plan->focal;
 	const float *own[3] = { fill_own_row(fill, y - 1) + x, fill_own_row(fill, y) + x, fill_own_row(fill, y + 1) + x };
-	float z[FILL_PIECE], apart[FILL_PIECE];
+	const uint32_t end = places->at[n - 1] + 1u;
+	float z[FILL_PIECE];
+	uint16_t place[FILL_PIECE], far[FILL_PIECE];
+	uint32_t n_far;
 
-	memset(z, 0, sizeof z);
-	for (uint32_t i = 0; i < n; i++)
-		z[places->at[i]] = places->z[i];
-	fill->simd->fill_apart(apart, z, own, places->at[n - 1] + 1u);
+	memset(z, 0xff, end * sizeof *z); /* no numbers */
 	for (uint32_t i = 0; i < n; i++) {
-		const float limit = plan->perspective ? along * places->z[i] : along;
-
-		if (places->weight[i] < WEIGHT_ONE / 2 && places->z[i] < INFINITY && !(apart[places->at[i]] <= limit))
-			places->z[i] = note_depth(counts, fill, x + places->at[i], y, places->z[i]);
+		z[places->at[i]] = places->weight[i] < WEIGHT_ONE / 2 ? places->z[i] : INFINITY;
+		place[places->at[i]] = (uint16_t)i;
 	}
+	n_far = fill->simd->fill_far(far, z, own, end, fill->plan->perspective ? along : 0,
+	                             fill->plan->perspective ? 0 : along);
+	for (uint32_t i = 0; i < n_far; i++)
+		places->z[place[far[i]]] = note_depth(counts, fill, x + far[i], y, z[far[i]]);
 }
 
 /* A place is as far from the surface as the sample beside it may be, and as it is from that; in perspective, that one's

@@ -51,9 +51,39 @@ struct fill_places {
 typedef uint32_t fill_push_picture_fn(struct fill_places *places, uint32_t *left, uint32_t bit,
                                       const struct fill_row *was, const struct fill_parents *parents);
 
-/* Finds the least difference of each of n values z from those of three rows that are the nearest to it, of own[k][-1] to
- * own[k][1] at the first; INFINITY where all these are NaN. */
-typedef void fill_apart_fn(float *apart, const float *z, const float *const own[3], uint32_t n);
+/* Lists which of n values z, finite ones, are farther than scale * z + offset from all values of three rows that are
+ * the nearest to it, own[k][-1] to own[k][1] at the first; NaN are none. Returns how many; elements of `far` beyond them
+ * are undefined. */
+typedef uint32_t fill_far_fn(uint16_t *far, const float *z, const float *const own[3], uint32_t n, float scale,
+                             float offset);
+
+/* Where a pixel of depth z is: x and y in pixels from where the view axis meets the picture. */
+struct fill_from {
+	float x, y, z;
+	float wider; /* the factor from another z' to how much wider pixels are there, 0 if orthographic; */
+	float steep; /* from a difference in z' to pixels */
+};
+
+/* What is in a square of pixels around it, distances in its pixels. */
+struct fill_beside {
+	uint32_t n;      /* how many have a finite z' */
+	float distance2; /* the square of the nearest one's in space, INFINITY without any */
+	float along;     /* the least along the view axis, of any; INFINITY without any */
+};
+
+#define FILL_SQUARE 3 /* most pixels to each side */
+
+/* Looks at the square of pixels up to `reach` to each side of that at `own`, in rows of `stride`; reads, and ignores,
+ * others up to FILL_SQUARE to the left and one more to the right. */
+typedef struct fill_beside fill_beside_fn(const struct fill_from *from, const float *own, ptrdiff_t stride, int reach);
+
+/* Finds the pixel of the square, from the middle, that is `along` off along the view axis, of equal ones the least
+ * aside, of these the first; there is one. */
+struct fill_place {
+	int x, y;
+};
+typedef struct fill_place fill_pick_fn(const struct fill_from *from, const float *own, ptrdiff_t stride, int reach,
+                                       float along);
 
 /* Reads z' from n words of pixels of any weight; NAN for those of none. */
 typedef void fill_own_fn(float *own, const uint64_t *word, const uint16_t *weight, uint32_t n);

@@ -53,7 +53,9 @@ struct simd {
 	fill_pull_colors_fn *fill_pull_colors;
 	fill_push_fn *fill_push;
 	fill_push_picture_fn *fill_push_picture;
-	fill_apart_fn *fill_apart;
+	fill_far_fn *fill_far;
+	fill_beside_fn *fill_beside;
+	fill_pick_fn *fill_pick;
 	fill_own_fn *fill_own;
 	fill_depths_fn *fill_depths;
 	smooth_places_fn *smooth_places;

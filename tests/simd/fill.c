@@ -1,5 +1,5 @@
-/* fill_pull_weights, fill_pull_colors, fill_push, fill_push_picture, fill_apart, fill_own and fill_depths: rows of 1
- * to FILL_WIDTH cells; whole, partial and empty ones, and outside of the picture. */
+/* fill_pull_weights, fill_pull_colors, fill_push, fill_push_picture, fill_far, fill_own and fill_depths: rows of 1 to
+ * FILL_WIDTH cells; whole, partial and empty ones, and outside of the picture. fill_beside and fill_pick: squares. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -157,28 +157,88 @@ static void bench_push(struct check *c)
 	push_picture(c, FILL_WIDTH, 0);
 }
 
-static void apart(struct check *c, uint32_t n)
+static void far(struct check *c, uint32_t n)
 {
 	const float *z = random_row(c, n, 0, 0, 0, 1).z, *own[3];
-	float *out = check_out(c, n, sizeof *out);
+	const float scale = check_below(c, 2) ? 0x1p-8f : 0, offset = check_below(c, 2) ? 0x1p-6f : 0;
+	uint16_t *out = check_out(c, n, sizeof *out);
 
 	for (int k = 0; k < 3; k++)
 		own[k] = random_row(c, n, 1, 0, 0, 1).z;
 	check_units(c, n);
 	while (check_next(c)) {
-		c->simd->fill_apart(out, z, own, n);
-		check_settle(out, n);
+		const uint32_t n_far = c->simd->fill_far(out, z, own, n, scale, offset);
+
+		check_result(c, n_far);
+		if (!c->is_bench)
+			memset(out + n_far, 0, (n - n_far) * sizeof *out);
 	}
 }
 
-static void random_apart(struct check *c)
+static void random_far(struct check *c)
 {
-	apart(c, 1 + check_below(c, 2 * FILL_WIDTH));
+	far(c, 1 + check_below(c, 2 * FILL_WIDTH));
 }
 
-static void bench_apart(struct check *c)
+static void bench_far(struct check *c)
 {
-	apart(c, 2 * FILL_WIDTH);
+	far(c, 2 * FILL_WIDTH);
+}
+
+/* A square of depths, and a pixel in the middle: as from the perspective or orthographic views of fill_near.c. */
+struct square {
+	struct fill_from from;
+	const float *own;
+	ptrdiff_t stride;
+	int reach;
+};
+
+static struct square random_square(struct check *c)
+{
+	const uint32_t stride = 2 * FILL_SQUARE + 2 + check_below(c, 8), n = stride * (2 * FILL_SQUARE + 1);
+	float *own = check_in(c, n, sizeof *own);
+	const float z = 1 + (float)check_below(c, 256) / 64;
+	const int is_perspective = (int)check_below(c, 2);
+
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t kind = check_below(c, 8);
+
+		own[i] = kind == 0 ? NAN : kind == 1 ? INFINITY : z + ((float)check_below(c, 65) - 32) / 256;
+	}
+	return (struct square){
+		{ (float)check_below(c, 1024) - 511.5f, (float)check_below(c, 1024) - 511.5f, z, is_perspective ? 1 / z : 0,
+		  is_perspective ? 1000 / z : 1000 },
+		own + FILL_SQUARE * stride + FILL_SQUARE, (ptrdiff_t)stride, 1 + (int)check_below(c, FILL_SQUARE),
+	};
+}
+
+static void beside(struct check *c)
+{
+	const struct square s = random_square(c);
+	struct fill_beside *out = check_out(c, 1, sizeof *out);
+
+	while (check_next(c))
+		*out = c->simd->fill_beside(&s.from, s.own, s.stride, s.reach);
+}
+
+static void pick(struct check *c)
+{
+	const struct square s = random_square(c);
+	struct fill_place *out = check_out(c, 1, sizeof *out);
+
+	while (check_next(c)) {
+		const struct fill_beside beside = c->simd->fill_beside(&s.from, s.own, s.stride, s.reach);
+
+		*out = (struct fill_place){ 0, 0 };
+		if (beside.n)
+			*out = c->simd->fill_pick(&s.from, s.own, s.stride, s.reach, beside.along);
+	}
+}
+
+static void bench_beside(struct check *c)
+{
+	check_units(c, 1);
+	beside(c);
 }
 
 static void own(struct check *c, uint32_t n)
@@ -230,13 +290,16 @@ int main(int argc, char **argv)
 		{ "fill_push: random cells", random_push, 2000, NULL },
 		{ "fill_push: infinite, huge, denormal and no numbers", spoilt_push, 2000, NULL },
 		{ "fill_push_picture: random and spoilt pixels", random_push_picture, 2000, NULL },
-		{ "fill_apart: depths, infinite ones and no numbers", random_apart, 500, NULL },
+		{ "fill_far: depths, infinite ones and no numbers", random_far, 500, NULL },
+		{ "fill_beside: depths, infinite ones and no numbers", beside, 2000, NULL },
+		{ "fill_pick: of pixels as near along the axis, the nearest aside", pick, 2000, NULL },
 		{ "fill_own: any words and weights", random_own, 500, NULL },
 		{ "fill_depths: any words", random_depths, 500, NULL },
 		{ "fill_pull_weights", bench_pull_weights, 0, "cell" },
 		{ "fill_pull_colors, from the picture", bench_pull_colors, 0, "cell" },
 		{ "fill_push_picture", bench_push, 0, "cell" },
-		{ "fill_apart", bench_apart, 0, "pixel" },
+		{ "fill_far", bench_far, 0, "pixel" },
+		{ "fill_beside", bench_beside, 0, "pixel" },
 		{ "fill_own", bench_own, 0, "pixel" },
 		{ "fill_depths", bench_depths, 0, "pixel" },
 	};

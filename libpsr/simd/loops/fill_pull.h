@@ -184,41 +184,6 @@ static inline void fill_pull_colors(const struct fill_row *to, const struct fill
 		pull_row(to, upper, lower, n, 0);
 }
 
-static inline float nearer(float apart, float own, float z)
-{
-	const float d = fabsf(own - z);
-
-	return d < apart ? d : apart;
-}
-
-static void fill_apart(float *restrict apart, const float *restrict z, const float *const own[3], uint32_t n)
-{
-	const float *const above = own[0] - 1, *const beside = own[1] - 1, *const below = own[2] - 1;
-
-	for (uint32_t x = 0; x < n; x++) {
-		float least = INFINITY;
-
-		least = nearer(least, above[x], z[x]);
-		least = nearer(least, above[x + 1], z[x]);
-		least = nearer(least, above[x + 2], z[x]);
-		least = nearer(least, beside[x], z[x]);
-		least = nearer(least, beside[x + 1], z[x]);
-		least = nearer(least, beside[x + 2], z[x]);
-		least = nearer(least, below[x], z[x]);
-		least = nearer(least, below[x + 1], z[x]);
-		apart[x] = nearer(least, below[x + 2], z[x]);
-	}
-}
-
-static void fill_own(float *restrict own, const uint64_t *restrict word, const uint16_t *restrict weight, uint32_t n)
-{
-	for (uint32_t x = 0; x < n; x++) {
-		const uint32_t none = weight[x] == 0 ? UINT32_MAX : 0;
-
-		own[x] = psr_float_from_bits((uint32_t)(word[x] >> 32) | none);
-	}
-}
-
 static void fill_depths(float *z, const uint64_t *word, uint32_t n)
 {
 	for (uint32_t x = 0; x < n; x++)

@@ -16,25 +16,26 @@ _Static_assert(2 * CLOSED_LEVELS <= GAPS_MARGIN, "two squares reach so far");
  * Returns whether any is finite. */
 static int find_near(float *near, const struct gaps_target *t, const struct gaps_tile *tile, int k, uint32_t y)
 {
-	const uint32_t stride = t->stack->level[k].width, n = ((tile->width - 1) >> k) + 1;
-	const float *cell = t->stack->level[k].z + (size_t)((tile->y0 + y) >> k) * stride + (tile->x0 >> k);
+	/* Not 32 bits: sums of indices that may wrap keep compilers from vectors. */
+	const size_t stride = t->stack->level[k].width, n = ((tile->width - 1) >> k) + 1;
+	const float *cell = t->stack->level[k].z + ((tile->y0 + y) >> k) * stride + (tile->x0 >> k);
 	float least[GAPS_WIDTH / 2 + 2], once[GAPS_WIDTH / 2 + SPREAD_RUN];
 	int32_t has_any = 0;
 
-	for (uint32_t i = 0; i < n + 2; i++) {
+	for (size_t i = 0; i < n + 2; i++) {
 		const float above = cell[i], own = cell[i + stride], below = cell[i + 2 * stride];
 		const float two = above < own ? above : own;
 
 		least[i] = two < below ? two : below;
 	}
-	for (uint32_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < n; i++) {
 		const float two = least[i] < least[i + 1] ? least[i] : least[i + 1];
 
 		once[i] = two < least[i + 2] ? two : least[i + 2];
 		has_any |= once[i] < INFINITY;
 	}
 	if (has_any)
-		spread(near, once, n, k);
+		spread(near, once, (uint32_t)n, k);
 	return has_any;
 }
 

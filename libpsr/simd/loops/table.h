@@ -4,6 +4,7 @@
 #include "average.h"
 #include "cull.h"
 #include "discs.h"
+#include "fill_near.h"
 #include "fill_pull.h"
 #include "fill_push.h"
 #include "gaps.h"
@@ -50,7 +51,9 @@
 	.fill_pull_colors = KERNEL(fill_pull_colors),  \
 	.fill_push = KERNEL(fill_push),                \
 	.fill_push_picture = KERNEL(fill_push_picture),\
-	.fill_apart = fill_apart,                      \
+	.fill_far = fill_far,                          \
+	.fill_beside = fill_beside,                    \
+	.fill_pick = fill_pick,                        \
 	.fill_own = fill_own,                          \
 	.fill_depths = fill_depths,                    \
 	.smooth_places = smooth_places,                \
