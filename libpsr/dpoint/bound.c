@@ -15,6 +15,7 @@
 #define MOST_DEPTH 64
 #define FEW 8          /* facets that are tried one by one */
 #define MANY 24        /* which halves are first to have fewer of */
+#define SURELY 1e-9    /* inner units */
 #define FINEST 32      /* of an error: smaller parts are not cut */
 
 /* A convex part of the rectangle. */
@@ -46,37 +47,49 @@ static void place_at(double p[3], const struct bound_view *view, double u, doubl
 	v3d_set(p, u, v, 0.5 * (view->a * u * u + view->b * v * v));
 }
 
-/* The facet that is nearest to the place, of those within the error. */
-static const struct bound_seen *nearest(const struct bounding *b, const double p[3], size_t begin, size_t end)
+/* The facet that is nearest to the place, of those within the error. Boxes that are further than the nearest one so far
+ * are not looked into; SURELY is more than distances are rounded by. likely: one that may be near, or NULL. */
+static const struct bound_seen *nearest(const struct bounding *b, const double p[3], size_t begin, size_t end,
+                                        const struct bound_seen *likely)
 {
 	const struct bound_seen *best = NULL;
 	double least = b->error * b->error;
+	struct bound_box reach;
 
+	if (likely != NULL)
+		least = lesser(least, bound_distance2(likely, p));
+	bound_box_reach(&reach, p, p, lesser(b->error, sqrt(least) + SURELY));
 	for (size_t i = begin; i < end; i++) {
 		const struct bound_seen *seen = &b->view->seen[b->view->list[i]];
 		double d;
 
-		if (bound_is_apart(seen, p, p, b->error))
+		if (bound_is_apart(&seen->box, &reach))
 			continue;
 		d = bound_distance2(seen, p);
 		if (d <= least) {
 			least = d;
 			best = seen;
+			bound_box_reach(&reach, p, p, lesser(b->error, sqrt(d) + SURELY));
 		}
 	}
 	return best;
 }
 
-static int suffices(const struct bounding *b, const struct bound_seen *seen, const struct part *part, double departure,
-                    double shift)
+/* What a convex part of the quadric departs from its corners' hull by, and how much of it moves the corners. */
+struct bend {
+	double departure, shift;
+};
+
+static int suffices(const struct bounding *b, const struct bound_seen *seen, const struct part *part,
+                    const struct bend *bend)
 {
-	const double most = b->error - departure;
+	const double most = b->error - bend->departure;
 
 	for (int i = 0; i < part->n; i++) {
 		double p[3];
 
 		place_at(p, b->view, part->corner[i][0], part->corner[i][1]);
-		p[2] += shift;
+		p[2] += bend->shift;
 		if (!(bound_distance2(seen, p) <= most * most))
 			return 0;
 	}
@@ -145,15 +158,16 @@ static int cut_along(struct part side[2], const struct part *part, const struct 
 static int filter(const struct bounding *b, size_t begin, size_t end, const double low[3], const double high[3])
 {
 	struct bound_view *view = b->view;
+	struct bound_box reach;
 
+	if (!ARRAY_ROOM(view->list, view->n_list + (end - begin), view->list_room)) {
+		view->is_failed = 1;
+		return 0;
+	}
+	bound_box_reach(&reach, low, high, b->error);
 	for (size_t i = begin; i < end; i++) {
-		if (bound_is_apart(&view->seen[view->list[i]], low, high, b->error))
-			continue;
-		if (!ARRAY_ROOM(view->list, view->n_list, view->list_room)) {
-			view->is_failed = 1;
-			return 0;
-		}
-		view->list[view->n_list++] = view->list[i];
+		view->list[view->n_list] = view->list[i];
+		view->n_list += !bound_is_apart(&view->seen[view->list[i]].box, &reach);
 	}
 	return view->n_list > end;
 }
@@ -182,43 +196,71 @@ static void middle_of(double at[2], const struct part *part)
 			at[k] += part->corner[i][k] / part->n;
 }
 
-/* Facets are those of the list from `begin` on. */
-static int part_holds(const struct bounding *b, const struct part *part, size_t begin, int depth)
+/* Whether the facet that is nearest to the part's middle suffices; it becomes *seen, or NULL if none is near. */
+static int nearest_suffices(const struct bound_seen **seen, const struct bounding *b, const struct part *part,
+                            const struct bend *bend, size_t begin, size_t end, const struct bound_seen *likely)
+{
+	double middle[3];
+
+	place_at(middle, b->view, b->place[0], b->place[1]);
+	*seen = nearest(b, middle, begin, end, likely);
+	return *seen != NULL && suffices(b, *seen, part, bend);
+}
+
+static int any_suffices(const struct bounding *b, const struct part *part, const struct bend *bend, size_t begin)
+{
+	const struct bound_view *view = b->view;
+
+	for (size_t i = begin; i < view->n_list; i++)
+		if (suffices(b, &view->seen[view->list[i]], part, bend))
+			return 1;
+	return 0;
+}
+
+/* Facets are those of the list from `begin` on. likely: one that is tried first, as it was near to what the part was cut
+ * from; or NULL. A short list is looked through before it becomes shorter: that often is the end of it. */
+static int part_holds(const struct bounding *b, const struct part *part, size_t begin, int depth,
+                      const struct bound_seen *likely)
 {
 	struct bound_view *view = b->view;
 	const size_t end = view->n_list;
-	double low[3], high[3], middle[3], bend[2], size;
+	double low[3], high[3], bends[2], size;
 	const struct bound_seen *seen = NULL;
 	struct part side[2];
+	struct bend bend;
 	size_t n, top;
 	int is_whole, is_crowded, axis, holds;
 
 	box_of(low, high, view, part);
 	middle_of(b->place, part);
-	place_at(middle, view, b->place[0], b->place[1]);
 	for (int k = 0; k < 2; k++)
-		bend[k] = (k == 0 ? view->a : view->b) * (high[k] - low[k]) * (high[k] - low[k]) / 16;
-	size = greater(high[0] - low[0], high[1] - low[1]);
-	axis = high[1] - low[1] > high[0] - low[0];
+		bends[k] = (k == 0 ? view->a : view->b) * (high[k] - low[k]) * (high[k] - low[k]) / 16;
+	bend = (struct bend){ fabs(bends[0]) + fabs(bends[1]), -bends[0] - bends[1] };
+	is_whole = bend.departure <= b->error / 4;
+	if (is_whole && likely != NULL && suffices(b, likely, part, &bend))
+		return 1;
+	if (is_whole && end - begin <= MANY) {
+		if (nearest_suffices(&seen, b, part, &bend, begin, end, likely))
+			return 1;
+		if (seen == NULL)
+			return 0;
+	}
 	if (!filter(b, begin, end, low, high))
 		return 0;
 	n = view->n_list - end;
-	is_whole = fabs(bend[0]) + fabs(bend[1]) <= b->error / 4;
-	if (!is_whole)
-		axis = fabs(bend[1]) > fabs(bend[0]);
+	size = greater(high[0] - low[0], high[1] - low[1]);
 	is_crowded = n > MANY && 4 * n < 3 * (end - begin) && size > b->error / 2;
 	if (is_whole && !is_crowded) {
-		seen = nearest(b, middle, end, view->n_list);
+		if (seen == NULL && nearest_suffices(&seen, b, part, &bend, end, view->n_list, likely))
+			return 1;
 		if (seen == NULL)
 			return 0;
-		if (suffices(b, seen, part, fabs(bend[0]) + fabs(bend[1]), -bend[0] - bend[1]))
+		if (n <= FEW && any_suffices(b, part, &bend, end))
 			return 1;
-		for (size_t i = end; i < view->n_list && n <= FEW; i++)
-			if (suffices(b, &view->seen[view->list[i]], part, fabs(bend[0]) + fabs(bend[1]), -bend[0] - bend[1]))
-				return 1;
 	}
 	if (size <= b->error / FINEST || depth >= MOST_DEPTH)
 		return 0;
+	axis = is_whole ? high[1] - low[1] > high[0] - low[0] : fabs(bends[1]) > fabs(bends[0]);
 	if (seen == NULL || part->n > MOST_CORNERS - 4 || !cut_along(side, part, seen, lesser(size, b->error) / 16)) {
 		double line[3] = { axis == 0, axis == 1, -0.5 * (low[axis] + high[axis]) };
 
@@ -226,9 +268,9 @@ static int part_holds(const struct bounding *b, const struct part *part, size_t 
 			return 0;
 	}
 	top = view->n_list;
-	holds = part_holds(b, &side[0], end, depth + 1);
+	holds = part_holds(b, &side[0], end, depth + 1, seen);
 	view->n_list = top;
-	return holds && part_holds(b, &side[1], end, depth + 1);
+	return holds && part_holds(b, &side[1], end, depth + 1, seen);
 }
 
 /* What fails mostly does so at a corner, or in the middle of a side. */
@@ -239,7 +281,7 @@ static int outline_holds(const struct bounding *b, const float extent[2])
 
 		place_at(p, b->view, (i % 3 - 1) * (double)extent[0], (i / 3 - 1) * (double)extent[1]);
 		memcpy(b->place, p, 2 * sizeof *p);
-		if (nearest(b, p, 0, b->view->n_list) == NULL)
+		if (nearest(b, p, 0, b->view->n_list, NULL) == NULL)
 			return 0;
 	}
 	return 1;
@@ -260,7 +302,7 @@ static int holds(struct bound_view *view, const float extent[2], double error, d
 		}
 		view->list[view->n_list++] = (uint32_t)i;
 	}
-	return (is_likely || outline_holds(&b, extent)) && part_holds(&b, &all, 0, 0) && !view->is_failed;
+	return (is_likely || outline_holds(&b, extent)) && part_holds(&b, &all, 0, 0, NULL) && !view->is_failed;
 }
 
 int bound_holds(struct bound_view *view, const float extent[2], double error, double place[2])

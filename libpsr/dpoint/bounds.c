@@ -18,7 +18,9 @@ struct measuring {
 	const struct dpoint_cover_options *options;
 	struct dpoint_bounds *of_chunk;
 	double worst;  /* some chunk's: what is certainly below it is not measured */
-	int stride;    /* this turn measures each stride-th chunk; 0: the others */
+	int n_chunks;
+	int stride;    /* this turn measures each stride-th chunk from the last on, where points that mend are, which may be far
+	                * off; 0: the others */
 	int is_failed;
 };
 
@@ -71,7 +73,7 @@ static int is_chunk_less(struct bound_view *view, const struct measuring *m, siz
 static void measure_chunk(int i, void *userdata)
 {
 	struct measuring *m = userdata;
-	const int chunk = m->stride > 0 ? i * m->stride : i + i / (SAMPLE - 1) + 1;
+	const int chunk = m->n_chunks - 1 - (m->stride > 0 ? i * m->stride : i + i / (SAMPLE - 1) + 1);
 	struct dpoint_bounds *bounds = &m->of_chunk[chunk];
 	struct bound_view view = { .seen = NULL };
 	const size_t begin = (size_t)chunk * CHUNK, n = m->surface->n_candidates;
@@ -92,7 +94,8 @@ int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surf
                           struct psr_pool *pool)
 {
 	const int n_chunks = (int)((surface->n_candidates + CHUNK - 1) / CHUNK), n_first = (n_chunks + SAMPLE - 1) / SAMPLE;
-	struct measuring m = { .surface = surface, .choice = choice, .options = options, .stride = SAMPLE };
+	struct measuring m = { .surface = surface, .choice = choice, .options = options, .n_chunks = n_chunks,
+	                       .stride = SAMPLE };
 
 	*bounds = (struct dpoint_bounds){ 0, 0 };
 	if (surface->facets.n == 0)

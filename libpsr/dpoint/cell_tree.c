@@ -2,7 +2,9 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include "base/vec.h"
+#include "sight.h"
 
 struct entry {
 	float middle[3];
@@ -60,11 +62,22 @@ static inline float greater(float a, float b)
 	return b > a ? b : a;
 }
 
+/* The last lane is what comes after the corner. */
+static inline lanes lanes_of_corner(const struct dpoint_cell *cell, int c)
+{
+	lanes corner;
+
+	memcpy(&corner, (const char *)cell + offsetof(struct dpoint_cell, corner) + (size_t)c * sizeof cell->corner[0],
+	       sizeof corner);
+	return corner;
+}
+
 /* Returns the axis along which the cells reach furthest. */
 static int bound_places(struct cell_ball *ball, const struct cell_node *node, const struct making *m)
 {
 	float low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
-	float radius2 = 0, half[3] = { 0, 0, 0 };
+	float radius2 = 0;
+	lanes middle, half = lanes_all(0);
 	int axis = 0;
 
 	for (uint32_t e = node->begin; e < node->end; e++)
@@ -76,17 +89,17 @@ static int bound_places(struct cell_ball *ball, const struct cell_node *node, co
 		ball->middle[k] = 0.5f * (low[k] + high[k]);
 		axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
 	}
+	middle = sight_place(ball->middle);
 	for (uint32_t e = node->begin; e < node->end; e++)
 		for (int c = 0; c < 4; c++) {
-			float away[3];
+			const lanes away = lanes_of_corner(&m->cell[m->entry[e].cell], c) - middle, square = away * away;
 
-			v3f_sub(away, m->cell[m->entry[e].cell].corner[c], ball->middle);
-			radius2 = greater(radius2, v3f_dot(away, away));
-			for (int k = 0; k < 3; k++)
-				half[k] = greater(half[k], fabsf(away[k]));
+			radius2 = greater(radius2, square[0] + square[1] + square[2]);
+			half = lanes_greater(half, lanes_size(away));
 		}
 	ball->radius = sqrtf(radius2) * 1.00001f;
-	v3f_scale(ball->half, half, 1.00001f);
+	half *= lanes_all(1.00001f);
+	memcpy(ball->half, &half, sizeof ball->half);
 	return axis;
 }
 

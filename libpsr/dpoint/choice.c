@@ -78,6 +78,29 @@ void tally_add(struct tally *tally, uint32_t candidate, int by)
 	}
 }
 
+/* Returns the least of a path below a node. */
+static uint32_t sum_below(struct tally *tally, size_t i)
+{
+	uint32_t a = 0, b = 0;
+
+	if (!cell_node_is_leaf(&tally->cover->tree->node[i])) {
+		a = sum_below(tally, 2 * i + 1);
+		b = sum_below(tally, 2 * i + 2);
+	}
+	return tally->least[i] = tally->own[i] + (a < b ? a : b);
+}
+
+void tally_add_all(struct tally *tally)
+{
+	const struct dpoint_cover *cover = tally->cover;
+
+	for (uint32_t i = 0; i < cover->n_candidates; i++)
+		for (uint32_t k = 0; k < cover->n[i]; k++)
+			tally->own[cover->list[i][k]]++;
+	if (cover->tree != NULL)
+		sum_below(tally, 0);
+}
+
 int tally_has(const struct tally *tally, uint32_t candidate, uint32_t n)
 {
 	for (uint32_t k = 0; k < tally->cover->n[candidate]; k++) {

@@ -34,6 +34,7 @@ struct tally {
 int tally_init(struct tally *tally, const struct dpoint_cover *cover); /* MEMORY; tally_fini() even then */
 void tally_fini(struct tally *tally);
 void tally_add(struct tally *tally, uint32_t candidate, int by); /* by: 1 or -1 */
+void tally_add_all(struct tally *tally); /* each candidate of the cover, to none */
 
 /* Returns whether each cell of the candidate is covered by at least n candidates. */
 int tally_has(const struct tally *tally, uint32_t candidate, uint32_t n);

@@ -2,6 +2,7 @@
  * exchanged for fewer. */
 #include <math.h>
 #include <stdlib.h>
+#include "base/radix.h"
 #include "choice.h"
 
 /* What is not covered yet. Cells weigh the less, the more cells the largest of their candidates covers: so a weight is
@@ -93,7 +94,7 @@ static void open_close(struct open *open, uint32_t candidate)
 struct front {
 	size_t *first;       /* of each node's candidates */
 	uint32_t *candidate;
-	struct heap_entry *leaf;
+	struct radix_entry *leaf; /* the value is a node */
 	float *gain;         /* of candidates: an upper bound, as gains only fall */
 };
 
@@ -106,7 +107,7 @@ static int front_init(struct front *front, const struct dpoint_cover *cover)
 		total += cover->n[i];
 	front->first = calloc(n_nodes + 2, sizeof *front->first);
 	front->candidate = malloc((total + 1) * sizeof *front->candidate);
-	front->leaf = malloc((cover->n_cells + 1) * sizeof *front->leaf);
+	front->leaf = malloc((2 * cover->n_cells + 1) * sizeof *front->leaf);
 	front->gain = malloc((cover->n_candidates + 1) * sizeof *front->gain);
 	if (front->first == NULL || front->candidate == NULL || front->leaf == NULL || front->gain == NULL)
 		return PSR_ERR_MEMORY;
@@ -130,41 +131,37 @@ static void front_fini(struct front *front)
 	free(front->gain);
 }
 
-static int compare_leaves(const void *a, const void *b)
-{
-	const struct heap_entry *x = a, *y = b;
-
-	return heap_is_above(x, y) ? 1 : heap_is_above(y, x) ? -1 : 0;
-}
-
-static void list_leaves(struct heap_entry *leaf, const struct cell_tree *tree, size_t i, int axis)
+static void list_leaves(struct radix_entry *leaf, const struct cell_tree *tree, size_t i)
 {
 	const struct cell_node *node = &tree->node[i];
 
 	if (cell_node_is_leaf(node)) {
-		leaf[node->begin] = (struct heap_entry){ tree->ball[i].middle[axis], (uint32_t)i };
+		leaf[node->begin].value = (uint32_t)i;
 		return;
 	}
-	list_leaves(leaf, tree, 2 * i + 1, axis);
-	list_leaves(leaf, tree, 2 * i + 2, axis);
+	list_leaves(leaf, tree, 2 * i + 1);
+	list_leaves(leaf, tree, 2 * i + 2);
 }
 
 /* Sweeps along the axis of the longest side. */
-static void sort_leaves(struct heap_entry *leaf, const struct cell_tree *tree, const struct cell_node *all)
+static void sort_leaves(struct radix_entry *leaf, const struct cell_tree *tree, const struct cell_node *all)
 {
 	float low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
 	int axis = 0;
 
-	for (int k = 0; k < 3; k++) {
-		list_leaves(leaf, tree, 0, k);
-		for (uint32_t i = 0; i < all->end; i++) {
-			low[k] = fminf(low[k], leaf[i].key);
-			high[k] = fmaxf(high[k], leaf[i].key);
+	list_leaves(leaf, tree, 0);
+	for (uint32_t i = 0; i < all->end; i++)
+		for (int k = 0; k < 3; k++) {
+			const float x = tree->ball[leaf[i].value].middle[k];
+
+			low[k] = x < low[k] ? x : low[k];
+			high[k] = x > high[k] ? x : high[k];
 		}
+	for (int k = 0; k < 3; k++)
 		axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
-	}
-	list_leaves(leaf, tree, 0, axis);
-	qsort(leaf, all->end, sizeof *leaf, compare_leaves);
+	for (uint32_t i = 0; i < all->end; i++)
+		leaf[i].key = (uint64_t)radix_of_float(tree->ball[leaf[i].value].middle[axis]) << 32 | (UINT32_MAX - leaf[i].value);
+	radix_sort(leaf, all->end);
 }
 
 /* Returns the candidate of the greatest gain among those that cover the leaf, or UINT32_MAX. */
@@ -200,7 +197,7 @@ static void advance(struct dpoint_choice *choice, struct front *front, struct ta
 	for (uint32_t i = 0; i < cover->n_candidates; i++)
 		front->gain[i] = open_gain(open, i);
 	for (size_t c = 0; c < cover->n_cells; c++) {
-		const uint32_t leaf = front->leaf[c].candidate;
+		const uint32_t leaf = front->leaf[c].value;
 		const uint32_t best = open->weight[leaf] > 0 ? best_at(front, open, leaf) : UINT32_MAX;
 
 		if (best == UINT32_MAX)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/array.h"
+#include "base/radix.h"
 #include "psr/error.h"
 
 #define LEAF 4
@@ -29,20 +30,6 @@ void facets_fini(struct facets *facets)
 }
 
 /* ---- order ---- */
-
-struct entry {
-	uint64_t morton;
-	size_t index;
-};
-
-static int compare(const void *a, const void *b)
-{
-	const struct entry *x = a, *y = b;
-
-	if (x->morton != y->morton)
-		return x->morton < y->morton ? -1 : 1;
-	return x->index < y->index ? -1 : x->index > y->index;
-}
 
 /* Sixteen bits an axis of the middle, -1..1. */
 static uint64_t morton_of(const struct facet *facet)
@@ -87,7 +74,7 @@ static void bound(const struct facets *facets, size_t i, size_t begin, size_t en
 
 int facets_sort(struct facets *facets)
 {
-	struct entry *entry = malloc((facets->n + 1) * sizeof *entry);
+	struct radix_entry *entry = facets->n <= UINT32_MAX ? malloc((2 * facets->n + 1) * sizeof *entry) : NULL;
 	struct facet *sorted = malloc((facets->n + 1) * sizeof *sorted);
 	size_t n_nodes = 1;
 
@@ -101,10 +88,10 @@ int facets_sort(struct facets *facets)
 		return PSR_ERR_MEMORY;
 	}
 	for (size_t i = 0; i < facets->n; i++)
-		entry[i] = (struct entry){ morton_of(&facets->facet[i]), i };
-	qsort(entry, facets->n, sizeof *entry, compare);
+		entry[i] = (struct radix_entry){ morton_of(&facets->facet[i]), (uint32_t)i };
+	radix_sort(entry, facets->n);
 	for (size_t i = 0; i < facets->n; i++)
-		sorted[i] = facets->facet[entry[i].index];
+		sorted[i] = facets->facet[entry[i].value];
 	free(entry);
 	free(facets->facet);
 	facets->facet = sorted;

@@ -201,8 +201,8 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	if (cover->tree == NULL)
 		return PSR_OK;
 	rc = tally_init(&tally, cover);
-	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
-		tally_add(&tally, i, 1);
+	if (rc == PSR_OK)
+		tally_add_all(&tally);
 	/* Rims cut cells of patches to slanted pieces: a rectangle along the longest side of such a one may go far beyond. */
 	if (surface->margin > 0 && !(options->error > 0)) {
 		m.error = 0.25 * (double)options->height;

@@ -66,6 +66,15 @@ static int is_of_patch(const struct psr_mesh *mesh, uint32_t t)
 	return mesh->triangle_patch != NULL && mesh->triangle_patch[t] != UINT32_MAX;
 }
 
+/* Whether any triangle is of no patch. */
+static int has_own(const struct psr_mesh *mesh)
+{
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		if (!is_of_patch(mesh, t))
+			return 1;
+	return 0;
+}
+
 /* Before anything is cut: what is too much is told at once. */
 static int check(const struct corners *corners, const struct psr_mesh *mesh, const struct dpoint_mesh_options *options,
                  struct psr_error *err)
@@ -169,8 +178,11 @@ int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *me
 	struct bound_view view = { .seen = NULL };
 	struct cutting c = { .surface = surface, .options = options, .view = is_bounded(options) ? &view : NULL };
 	struct corners corners;
-	int rc = corners_init(&corners, mesh, options);
+	int rc;
 
+	if (!has_own(mesh))
+		return PSR_OK;
+	rc = corners_init(&corners, mesh, options);
 	if (rc == PSR_OK)
 		rc = check(&corners, mesh, options, err);
 	if (rc == PSR_OK)

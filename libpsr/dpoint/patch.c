@@ -71,16 +71,17 @@ int dpoint_patch_span(struct dpoint_span *span, const struct dpoint_patch *patch
 	return i / n_v < n_spans_along(patch, 0, i / n_v, &span->at[0]);
 }
 
-/* The basis functions of degree p that are not 0 at x, and their first two derivatives: the functions of degrees
- * p - 1 and p - 2, divided by the knots' differences. */
-static void basis(double b[3][ORDER], const double *knot, uint32_t span, int p, double x)
+/* The basis functions of degree p that are not 0 at x, and if asked for their first two derivatives: the functions of
+ * degrees p - 1 and p - 2, divided by the knots' differences. */
+static inline void basis(double b[3][ORDER], const double *knot, uint32_t span, int p, double x, int has_derivatives)
 {
 	double of[3][ORDER + 2]; /* of degree p - 2, p - 1, p; with a 0 on both sides */
 	double left[ORDER], right[ORDER], n[ORDER] = { 1 };
 
-	memset(of, 0, sizeof of);
+	if (has_derivatives)
+		memset(of, 0, sizeof of);
 	for (int j = 0;; j++) {
-		if (j >= p - 2)
+		if (has_derivatives && j >= p - 2)
 			memcpy(&of[j - (p - 2)][1], n, (size_t)(j + 1) * sizeof *n);
 		if (j == p)
 			break;
@@ -96,9 +97,10 @@ static void basis(double b[3][ORDER], const double *knot, uint32_t span, int p, 
 		}
 		n[j + 1] = saved;
 	}
-	memset(b, 0, 3 * sizeof *b);
-	for (int i = 0; i <= p; i++)
-		b[0][i] = of[2][1 + i];
+	memcpy(b[0], n, sizeof n);
+	if (!has_derivatives)
+		return;
+	memset(b[1], 0, 2 * sizeof *b);
 	/* Function i of degree q begins at knot span - q + i. Its derivative is the difference of the two of degree q - 1
 	 * that begin there and one later, which are i - 1 and i of theirs. */
 	double slope[ORDER + 2] = { 0 }; /* of degree p - 1, with a 0 on both sides */
@@ -130,10 +132,10 @@ static void basis(double b[3][ORDER], const double *knot, uint32_t span, int p, 
 
 enum { S, U, V, UU, UV, VV, N_DERIVATIVES };
 
-/* Homogeneous place and derivatives, by units of a span. Returns the greatest coordinate of the control points that
- * count, from the first of them on. */
-static double homogeneous(double a[N_DERIVATIVES][4], const struct dpoint_patch *patch, const struct dpoint_span *span,
-                          const double uv[2])
+/* Homogeneous place and derivatives, the first n of them, by units of a span. Returns the greatest coordinate of the
+ * control points that count, from the first of them on. */
+static inline double homogeneous(double a[][4], int n, const struct dpoint_patch *patch, const struct dpoint_span *span,
+                                 const double uv[2])
 {
 	static const int order[N_DERIVATIVES][2] = { { 0, 0 }, { 1, 0 }, { 0, 1 }, { 2, 0 }, { 1, 1 }, { 0, 2 } };
 	double b[2][3][ORDER], width[2], size = 0;
@@ -143,13 +145,14 @@ static double homogeneous(double a[N_DERIVATIVES][4], const struct dpoint_patch 
 		const double *knot = patch->knot[k] + span->at[k];
 
 		width[k] = knot[1] - knot[0];
-		basis(b[k], patch->knot[k], span->at[k], patch->degree[k], uv[k] < 1 ? knot[0] + uv[k] * width[k] : knot[1]);
-		for (int i = 0; i <= patch->degree[k]; i++) {
+		basis(b[k], patch->knot[k], span->at[k], patch->degree[k], uv[k] < 1 ? knot[0] + uv[k] * width[k] : knot[1],
+		      n > S + 1);
+		for (int i = 0; i <= patch->degree[k] && n > S + 1; i++) {
 			b[k][1][i] *= width[k];
 			b[k][2][i] *= width[k] * width[k];
 		}
 	}
-	memset(a, 0, N_DERIVATIVES * sizeof *a);
+	memset(a, 0, (size_t)n * sizeof *a);
 	for (int i = 0; i <= patch->degree[0]; i++) {
 		const uint64_t row = (uint64_t)(span->at[0] - (uint32_t)patch->degree[0] + (uint32_t)i) * patch->n[1];
 
@@ -158,7 +161,7 @@ static double homogeneous(double a[N_DERIVATIVES][4], const struct dpoint_patch 
 
 			if (first == NULL)
 				first = p;
-			for (int d = 0; d < N_DERIVATIVES; d++) {
+			for (int d = 0; d < n; d++) {
 				const double k = b[0][order[d][0]][i] * b[1][order[d][1]][j] * p[3];
 
 				/* From the first control point on, so that a patch far from the origin loses nothing. */
@@ -167,7 +170,7 @@ static double homogeneous(double a[N_DERIVATIVES][4], const struct dpoint_patch 
 				a[d][3] += k;
 			}
 			for (int c = 0; c < 3; c++)
-				size = fmax(size, fabs(p[c] - first[c]));
+				size = fabs(p[c] - first[c]) > size ? fabs(p[c] - first[c]) : size;
 		}
 	}
 	return size;
@@ -188,9 +191,9 @@ static void place_of(double at[3], const double a[4], const double first[3])
 void dpoint_patch_place(double at[3], const struct dpoint_patch *patch, const struct dpoint_span *span,
                         const double uv[2])
 {
-	double a[N_DERIVATIVES][4];
+	double a[S + 1][4];
 
-	homogeneous(a, patch, span, uv);
+	homogeneous(a, S + 1, patch, span, uv);
 	place_of(at, a[S], first_control(patch, span));
 }
 
@@ -213,7 +216,7 @@ int dpoint_patch_local(struct dpoint_local *local, const struct dpoint_patch *pa
                        const double uv[2])
 {
 	double a[N_DERIVATIVES][4], s[N_DERIVATIVES][3];
-	double size = homogeneous(a, patch, span, uv), e, f, g, u, skew, v;
+	double size = homogeneous(a, N_DERIVATIVES, patch, span, uv), e, f, g, u, skew, v;
 
 	place_of(local->at, a[S], first_control(patch, span));
 	rational(s, (const double (*)[4])a);

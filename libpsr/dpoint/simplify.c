@@ -51,10 +51,10 @@ static int mark_cells(uint8_t *has, const struct dpoint_cover *cover)
 	int rc = tally_init(&tally, cover);
 
 	memset(has, ENOUGH, cover->n_cells);
-	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
-		tally_add(&tally, i, 1);
-	if (rc == PSR_OK)
+	if (rc == PSR_OK) {
+		tally_add_all(&tally);
 		mark_below(has, &tally, 0, 0);
+	}
 	tally_fini(&tally);
 	return rc;
 }

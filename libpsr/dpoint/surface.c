@@ -17,6 +17,14 @@ void dpoint_surface_fini(struct dpoint_surface *surface)
 	memset(surface, 0, sizeof *surface);
 }
 
+int dpoint_surface_reserve(struct dpoint_surface *surface, size_t n_cells, size_t n_candidates, size_t n_facets)
+{
+	return n_cells < UINT32_MAX && n_candidates < UINT32_MAX &&
+	       ARRAY_ROOM(surface->cell, n_cells, surface->cells_room) &&
+	       ARRAY_ROOM(surface->candidate, n_candidates, surface->candidates_room) &&
+	       ARRAY_ROOM(surface->facets.facet, n_facets, surface->facets.room);
+}
+
 struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface)
 {
 	if (surface->n_cells == UINT32_MAX || !ARRAY_ROOM(surface->cell, surface->n_cells, surface->cells_room))

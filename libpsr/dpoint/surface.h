@@ -55,6 +55,9 @@ struct dpoint_surface {
 void dpoint_surface_init(struct dpoint_surface *surface); /* empty */
 void dpoint_surface_fini(struct dpoint_surface *surface);
 
+/* Makes room for so many elements in all. Returns 0 without memory, or if they are more than there may be. */
+int dpoint_surface_reserve(struct dpoint_surface *surface, size_t n_cells, size_t n_candidates, size_t n_facets);
+
 /* Add one element. Return NULL without memory. */
 struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface);
 struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface);

@@ -284,6 +284,18 @@ static int put_triangle(struct sampling *s, uint32_t t)
 	return rc;
 }
 
+/* Whether one of the four cells around a corner is inside. */
+static int is_at_inside(const struct trim_grid *grid, uint32_t i, uint32_t j)
+{
+	const uint32_t n = grid->axis[0].n, m = grid->axis[1].n;
+	int is_inside = 0;
+
+	for (uint32_t x = i > 0 ? i - 1 : 0; x <= i && x < n; x++)
+		for (uint32_t y = j > 0 ? j - 1 : 0; y <= j && y < m; y++)
+			is_inside |= grid->state[(size_t)x * m + y] == TRIM_IN;
+	return is_inside;
+}
+
 /* Cells inside, with two lines of corners at a time. */
 static int put_inside(struct sampling *s)
 {
@@ -295,8 +307,9 @@ static int put_inside(struct sampling *s)
 		float (*row)[3] = corner + (i & 1) * ((size_t)y->n + 1), (*before)[3] = corner + (~i & 1) * ((size_t)y->n + 1);
 
 		for (uint32_t j = 0; j <= y->n; j++)
-			place(row[j], s, (const uint32_t[2]){ i < x->n ? i : i - 1, j < y->n ? j : j - 1 },
-			      (const double[2]){ x->line[i], y->line[j] });
+			if (is_at_inside(&s->grid, i, j))
+				place(row[j], s, (const uint32_t[2]){ i < x->n ? i : i - 1, j < y->n ? j : j - 1 },
+				      (const double[2]){ x->line[i], y->line[j] });
 		for (uint32_t j = 0; j < y->n && i > 0 && rc == PSR_OK; j++) {
 			const double uv[4][2] = { { x->line[i - 1], y->line[j] }, { x->line[i], y->line[j] },
 				                      { x->line[i], y->line[j + 1] }, { x->line[i - 1], y->line[j + 1] } };

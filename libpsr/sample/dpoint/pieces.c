@@ -62,11 +62,16 @@ static void find_grains(struct building *b)
 		b->grain[m] = b->look.is_plain[m] && b->mesh->color == NULL ? 0 : 2.0 / b->options->resolution;
 }
 
+struct place {
+	size_t cell, candidate, facet;
+};
+
 /* A patch, and what comes of it. */
 struct part {
 	const struct psr_patch *patch; /* NULL: it has no look, and nothing to cover */
 	uint64_t attr;
 	struct dpoint_surface surface;
+	struct place place; /* in the surface of all */
 	struct psr_error err;
 	int rc;
 };
@@ -185,34 +190,46 @@ static void sample(int i, void *userdata)
 		sample_patch(p, &p->part[p->order[i - 1].patch]);
 }
 
-/* Adds a part's cells, candidates and facets after those that are there. */
-static int append(struct dpoint_surface *to, const struct dpoint_surface *from)
+/* Copies a part's cells, candidates and facets to where they are in those of all. */
+static void append(int i, void *userdata)
 {
-	const uint32_t first = (uint32_t)to->n_cells;
+	const struct parts *p = userdata;
+	struct dpoint_surface *to = &p->b->surface, *from = &p->part[i].surface;
+	const struct place *at = &p->part[i].place;
 
-	for (size_t i = 0; i < from->n_cells; i++) {
-		struct dpoint_cell *cell = dpoint_surface_cell(to);
+	memcpy(to->cell + at->cell, from->cell, from->n_cells * sizeof *from->cell);
+	for (size_t c = 0; c < from->n_candidates; c++) {
+		struct dpoint_candidate *candidate = &to->candidate[at->candidate + c];
 
-		if (cell == NULL)
-			return PSR_ERR_MEMORY;
-		*cell = from->cell[i];
+		*candidate = from->candidate[c];
+		candidate->cell += (uint32_t)at->cell;
 	}
-	for (size_t i = 0; i < from->n_candidates; i++) {
-		struct dpoint_candidate *candidate = dpoint_surface_candidate(to);
+	memcpy(to->facets.facet + at->facet, from->facets.facet, from->facets.n * sizeof *from->facets.facet);
+	dpoint_surface_fini(from);
+}
 
-		if (candidate == NULL)
-			return PSR_ERR_MEMORY;
-		*candidate = from->candidate[i];
-		candidate->cell += first;
-	}
-	for (size_t i = 0; i < from->facets.n; i++) {
-		const float (*corner)[3] = (const float (*)[3])from->facets.facet[i].corner;
+/* Adds the parts after what is there. */
+static int append_all(struct parts *p)
+{
+	struct dpoint_surface *all = &p->b->surface;
+	struct place end = { all->n_cells, all->n_candidates, all->facets.n };
 
-		if (facets_add(&to->facets, corner[0], corner[1], corner[2]) != PSR_OK)
-			return PSR_ERR_MEMORY;
+	for (uint32_t i = 0; i < p->n; i++) {
+		const struct dpoint_surface *from = &p->part[i].surface;
+
+		p->part[i].place = end;
+		end.cell += from->n_cells;
+		end.candidate += from->n_candidates;
+		end.facet += from->facets.n;
+		all->n_bad += from->n_bad;
+		all->n_clamped += from->n_clamped;
 	}
-	to->n_bad += from->n_bad;
-	to->n_clamped += from->n_clamped;
+	if (!dpoint_surface_reserve(all, end.cell, end.candidate, end.facet))
+		return PSR_ERR_MEMORY;
+	all->n_cells = end.cell;
+	all->n_candidates = end.candidate;
+	all->facets.n = end.facet;
+	psr_pool_for(p->b->options->pool, (int)p->n, append, p);
 	return PSR_OK;
 }
 
@@ -229,12 +246,9 @@ static int join(struct parts *p)
 			return psr_fail(b->err, p->part[i].rc, "%s", p->part[i].err.text);
 	if (p->n_cells > TRIM_MOST_CELLS)
 		return dpoint_trimmed_refuse(b->options->piece, b->err);
-	for (uint32_t i = 0; i < p->n && rc == PSR_OK; i++) {
-		rc = append(&b->surface, &p->part[i].surface);
-		dpoint_surface_fini(&p->part[i].surface);
-	}
 	if (p->n > 0) {
 		b->surface.margin = MARGIN;
+		rc = append_all(p);
 		rc = rc == PSR_OK ? facets_sort(&b->surface.facets) : rc;
 	}
 	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "no memory for the pieces of %u patches", p->n);
