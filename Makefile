@@ -461,7 +461,7 @@ models: ## models: fetch the real models (dragon, bunny, engine, ...) into the c
 
 fetched := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/psr/models
 dragon := $(wildcard $(fetched)/dragon.ply)
-holes ?= 10
+holes ?= 11
 only ?=
 seconds ?=
 bench: deps ## bench: install what is missing, build, time frames beside llvmpipe, Embree and the thesis, and as things grow (only="dragon table-8.2")
@@ -472,7 +472,7 @@ bench: deps ## bench: install what is missing, build, time frames beside llvmpip
 bench-budget: compile $(BUDGET) ## bench-budget: whether budgets of time are kept, what they give, and the geometric bound (args="--only dragon")
 	$(Q)$(BUDGET) $(args) --programs $(BIN) $(BUILD)/bench-budget $(fetched)
 
-bench-cad: compile $(CAD_BENCH) ## bench-cad: seconds that a plate of NURBS patches takes to become differential points (holes=10 a side)
+bench-cad: compile $(CAD_BENCH) ## bench-cad: seconds that a plate of NURBS patches takes to become differential points (holes=11 a side)
 	$(Q)mkdir -p $(BUILD)/bench-cad
 	$(Q)[ -f $(BUILD)/bench-cad/plate$(holes).step ] || $(CAD_BENCH) $(holes) $(BUILD)/bench-cad/plate$(holes).step
 	$(Q)$(BIN)/psr-model build $(BUILD)/bench-cad/plate$(holes).step --representation dpoints -r 1024 \

@@ -19,7 +19,7 @@
 #include <TopoDS.hxx>
 
 /* Millimetres. */
-static constexpr double PITCH = 20, THICK = 10, RADIUS = 6, ROUND = 1.5;
+static constexpr double PITCH = 20, THICK = 15, RADIUS = 6, ROUND = 1.5;
 
 static TopoDS_Shape drilled(int holes)
 {
