@@ -25,10 +25,11 @@ enum octree_stream {
 /* Appends a stream to a coder that has begun, or reads it into the array, which has room for all leaves; the caller
  * checks coder_is_at_end(). Packing only reads the arrays.
  * Whatever the bytes are, normals are below PSR_DIRECTIONS and offsets below OCTREE_OFFSETS.
- * A normal of 13 bits, its last two zero, takes next to nothing for these two. MEMORY. */
+ * A normal of 13 bits, its last two zero, takes next to nothing for these two.
+ * is_older: 1 reads what ways 0 and 4 of a packed tree have (docs/format.md). MEMORY. */
 int octree_attributes_pack(struct coder *coder, const struct octree_levels *levels,
                            const struct octree_attributes *attributes, enum octree_stream stream);
 int octree_attributes_unpack(struct octree_attributes *attributes, struct coder *coder,
-                             const struct octree_levels *levels, enum octree_stream stream);
+                             const struct octree_levels *levels, enum octree_stream stream, int is_older);
 
 #endif

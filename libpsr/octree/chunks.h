@@ -7,8 +7,10 @@
 #define CHUNKS_HEADER 16
 #define CHUNKS_STEP 32
 #define CHUNKS_ENTRY 12 /* and 4 a stream */
-#define CHUNKS_WAY_FAST 0
-#define CHUNKS_WAY_SMALL 4
+#define CHUNKS_WAY_FAST 5
+#define CHUNKS_WAY_SMALL 6
+#define CHUNKS_WAY_OLDER_FAST 0 /* these two have the same codes and other attributes */
+#define CHUNKS_WAY_OLDER_SMALL 4
 
 /* What a step adds to a chunk. */
 struct chunk_step {

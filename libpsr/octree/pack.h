@@ -2,7 +2,8 @@
  * tree; with those before it, it is a tree that ends there ([B] 4.4). All integers are little-endian:
  *
  *   u8  levels
- *   u8  way         of the codes: 0 OCTREE_FAST, 4 OCTREE_SMALL; 1 to 3 were in no release
+ *   u8  way         of the codes: 5 OCTREE_FAST, 6 OCTREE_SMALL; 0 and 4 are the same with older attributes, which are
+ *                   read; 1 to 3 were in no release
  *   u8  cut         a depth: subtrees of its nodes are packed in chunks
  *   u8  streams     bit s: there is stream s of enum octree_stream
  *   u32 n_chunks

@@ -45,7 +45,7 @@ static void unpack_leaves(int i, void *userdata)
 	for (enum octree_stream s = 0; s < OCTREE_STREAMS && chunk->rc == PSR_OK; s++) {
 		if (!(u->streams >> s & 1))
 			continue;
-		chunk->rc = octree_attributes_unpack(&leaf, &step->attribute[s], &levels, s);
+		chunk->rc = octree_attributes_unpack(&leaf, &step->attribute[s], &levels, s, u->is_older);
 		if (chunk->rc == PSR_OK && !coder_is_at_end(&step->attribute[s]))
 			chunk->rc = PSR_ERR_FORMAT;
 		if (psr_is_cancelled(u->crew.cancel))

@@ -33,23 +33,31 @@ static int check_step(const struct octree_step *step, int s, int n, const struct
 	return PSR_OK;
 }
 
+static int read_way(struct unpacking *u, uint8_t way)
+{
+	u->packing = way == CHUNKS_WAY_FAST || way == CHUNKS_WAY_OLDER_FAST ? OCTREE_FAST : OCTREE_SMALL;
+	u->is_older = way == CHUNKS_WAY_OLDER_FAST || way == CHUNKS_WAY_OLDER_SMALL;
+	return u->is_older || way == CHUNKS_WAY_FAST || way == CHUNKS_WAY_SMALL;
+}
+
 /* Reads what tells the steps. Returns their number, or FORMAT. */
 static int read_steps(struct unpacking *u, struct psr_error *err)
 {
 	const uint8_t *b = u->at;
+	int is_known;
 	uint64_t n;
 
 	if (u->end - u->at < CHUNKS_HEADER)
 		return is_cut_short(err);
 	u->begin = b;
 	u->levels = b[0];
-	u->packing = b[1] == CHUNKS_WAY_FAST ? OCTREE_FAST : OCTREE_SMALL;
+	is_known = read_way(u, b[1]);
 	u->cut = b[2];
 	u->streams = b[3];
 	u->n_chunks = (uint32_t)get(b + 4, 4);
 	n = get(b + 8, 8);
-	if (u->levels < OCTREE_LEAST_LEVELS || u->levels > OCTREE_MOST_LEVELS ||
-	    (b[1] != CHUNKS_WAY_FAST && b[1] != CHUNKS_WAY_SMALL) || u->cut >= u->levels || u->streams >> OCTREE_STREAMS != 0 || n == 0 ||
+	if (u->levels < OCTREE_LEAST_LEVELS || u->levels > OCTREE_MOST_LEVELS || !is_known || u->cut >= u->levels ||
+	    u->streams >> OCTREE_STREAMS != 0 || n == 0 ||
 	    n > (chunk_may_step(u->streams) ? OCTREE_MOST_STEPS : 1))
 		return psr_fail(err, PSR_ERR_FORMAT, "a packed octree of %d levels, cut at %d, packed by way %d, of streams %#x, "
 		                "in %llu steps, is not known", u->levels, u->cut, b[1], u->streams, (unsigned long long)n);

@@ -9,7 +9,8 @@ struct unpacking {
 	const uint8_t *begin;
 	int levels, cut, depth;      /* depth: of the last step that is there */
 	unsigned streams;
-	enum octree_packing packing;
+	enum octree_packing packing; /* of the codes */
+	int is_older;                /* attributes are */
 	uint32_t n_chunks;
 	int n_steps;                 /* that are there */
 	struct octree_step step[OCTREE_MOST_STEPS]; /* all */

@@ -124,7 +124,7 @@ static int unpack(struct fixture *f, const uint8_t *bytes, size_t n, enum octree
 	assert_non_null(exact);
 	memcpy(exact, bytes, n);
 	coder_open(&coder, exact, n);
-	assert_int_equal(octree_attributes_unpack(&f->again, &coder, &f->levels, stream), PSR_OK);
+	assert_int_equal(octree_attributes_unpack(&f->again, &coder, &f->levels, stream, 0), PSR_OK);
 	free(exact);
 	return coder_is_at_end(&coder);
 }
