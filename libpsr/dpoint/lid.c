@@ -27,7 +27,7 @@ void lid_corners(struct dpoint_cell *cell, const struct lid *lid)
 	}
 }
 
-int lid_stops_all(const struct lid *lid, const float p[3], const float normal[3], float behind)
+int lid_stops_all(const struct lid *lid, const float p[3], const float normal[3], float flattest, float behind)
 {
 	const struct rectangle *r = &lid->rectangle;
 	const float off = fabsf(p[2] - dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1]));
@@ -40,7 +40,7 @@ int lid_stops_all(const struct lid *lid, const float p[3], const float normal[3]
 	m3f_apply_transposed(n, (const float (*)[3])r->axis, n);
 	cosine = fminf(1, v3f_dot(n, normal));
 	lean = sqrtf(1 - cosine * cosine);
-	least = cosine * LID_LEAST_COSINE - lean * sqrtf(1 - LID_LEAST_COSINE * LID_LEAST_COSINE);
+	least = cosine * flattest - lean * sqrtf(1 - flattest * flattest);
 	if (!(least > 0))
 		return 0;
 	reach = 2 * off / least;

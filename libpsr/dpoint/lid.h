@@ -4,7 +4,7 @@
 
 #include "rectangle.h"
 
-/* Cosine to the surface's normal of the flattest rays that are looked at: they graze it at 20 degrees. */
+/* Cosine to the surface's normal of the flattest rays from in front that are looked at: they graze it at 20 degrees. */
 #define LID_LEAST_COSINE 0.35f
 
 struct lid {
@@ -18,10 +18,10 @@ void lid_make(struct lid *lid, const struct dpoint_candidate *candidate, const s
 /* The corners of its plane, for a tree of lids; the cell has nothing else. */
 void lid_corners(struct dpoint_cell *cell, const struct lid *lid);
 
-/* Whether it stops each ray to the place p, in its rectangle's frame, whose cosine to `normal` is at least
- * LID_LEAST_COSINE: its quadric is so near to the place, leans so little and is so nearly flat there that all of them
- * meet it well within its sides. `behind`: as for lid_stops. */
-int lid_stops_all(const struct lid *lid, const float p[3], const float normal[3], float behind);
+/* Whether it stops each ray to the place p, in its rectangle's frame, whose cosine to `normal` is at least `flattest`:
+ * its quadric is so near to the place, leans so little and is so nearly flat there that all of them meet it well within
+ * its sides. `behind`: as for lid_stops. */
+int lid_stops_all(const struct lid *lid, const float p[3], const float normal[3], float flattest, float behind);
 
 /* Whether it is in the way of the ray that comes from direction `from` to the place p, in its rectangle's frame, or
  * stops it at most `behind` after the place. */

@@ -12,10 +12,17 @@
 #define AROUND 8  /* directions of a slant */
 #define PLACES 9  /* of a cell: corners, middles of sides, the middle */
 #define INWARDS 0.9f
+#define GRAZED 2.5f /* of `behind`, for rays along a wall: they get as much further before they are as deep */
 #define BEHIND 6  /* of options->height: three samples of a mesh's resolution ([G] 7.2) */
 
-static const float slant[2] = { 0.65f, LID_LEAST_COSINE }; /* cosines of rays to the cell's normal */
-#define DIRECTIONS (1 + 2 * AROUND)
+#define FRONT (1 + 2 * AROUND) /* rays from in front of a cell; more are from behind it */
+#define DIRECTIONS (FRONT + AROUND)
+
+#define GRAZING 0.12f
+
+/* Cosines of rays to the cell's normal. The last ones, 83 degrees off, are from behind alone: who looks into what is
+ * hollow and open sees its walls aslant as far as they go. */
+static const float slant[3] = { 0.65f, LID_LEAST_COSINE, GRAZING };
 
 struct sealing {
 	const struct dpoint_surface *surface;
@@ -64,11 +71,11 @@ static void gather(struct nearby *nearby, const struct sealing *s, size_t i, con
 }
 
 /* Stops those of the open rays that the lid is in the way of. Returns how many are left. */
-static int stop_rays(uint8_t *is_stopped, int n_open, const struct lid *lid, const float p[3], const float (*from)[3],
-                     float behind)
+static int stop_rays(uint8_t *is_stopped, int n_open, int n, const struct lid *lid, const float p[3],
+                     const float (*from)[3], float behind)
 {
-	for (int d = 0; d < DIRECTIONS; d++)
-		if (!is_stopped[d] && lid_stops(lid, p, from[d], behind)) {
+	for (int d = 0; d < n; d++)
+		if (!is_stopped[d] && lid_stops(lid, p, from[d], d < FRONT ? behind : GRAZED * behind)) {
 			is_stopped[d] = 1;
 			n_open--;
 		}
@@ -77,16 +84,16 @@ static int stop_rays(uint8_t *is_stopped, int n_open, const struct lid *lid, con
 
 /* Lids over the place come first: they stop most rays. */
 static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, const float at[3],
-                        const float (*from)[3], const float normal[3])
+                        const float (*from)[3], const float normal[3], int n)
 {
-	int n_open = DIRECTIONS;
+	int n_open = n;
 	uint8_t is_stopped[DIRECTIONS] = { 0 };
 
 	for (size_t i = 0; i < nearby->n; i++) {
 		struct near_lid *near = &nearby->near[i];
 
 		rectangle_sees(near->place, &near->lid->rectangle, at);
-		if (lid_stops_all(near->lid, near->place, normal, s->behind))
+		if (lid_stops_all(near->lid, near->place, normal, n > FRONT ? GRAZING : LID_LEAST_COSINE, s->behind))
 			return 1;
 	}
 	for (int is_over = 1; is_over >= 0; is_over--)
@@ -95,7 +102,7 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 			const float *p = near->place, *extent = near->lid->rectangle.extent;
 
 			if ((fabsf(p[0]) <= extent[0] && fabsf(p[1]) <= extent[1]) == is_over)
-				n_open = stop_rays(is_stopped, n_open, near->lid, p, from, s->behind);
+				n_open = stop_rays(is_stopped, n_open, n, near->lid, p, from, s->behind);
 		}
 	return n_open == 0;
 }
@@ -114,7 +121,7 @@ static int directions(float (*from)[3], const struct sealing *s, const struct dp
 		v3f_scale(normal, normal, -1);
 	dpoint_tangents(x, y, normal);
 	memcpy(from[0], normal, sizeof from[0]);
-	for (int d = 0; d < 2 * AROUND; d++) {
+	for (int d = 0; d < 3 * AROUND; d++) {
 		const float cosine = slant[d / AROUND], sine = sqrtf(1 - cosine * cosine), *turn = s->around[d % AROUND];
 
 		v3f_scale(from[1 + d], normal, cosine);
@@ -161,7 +168,7 @@ static int stops_all(const struct sealing *s, const struct lid *lid, const struc
 
 		place_of(place, cell, middle, p);
 		rectangle_sees(seen, &lid->rectangle, place);
-		if (!lid_stops_all(lid, seen, normal, s->behind))
+		if (!lid_stops_all(lid, seen, normal, LID_LEAST_COSINE, s->behind))
 			return 0;
 	}
 	return 1;
@@ -176,7 +183,7 @@ static int stops_rays(const struct sealing *s, struct nearby *nearby, const stru
 			float place[3];
 
 			place_of(place, cell, middle, p);
-			if (!is_sealed_at(s, nearby, place, from[side], from[side][0]))
+			if (!is_sealed_at(s, nearby, place, from[side], from[side][0], side == 0 ? FRONT : DIRECTIONS))
 				return 0;
 		}
 	return 1;

@@ -9,7 +9,7 @@
 #include "dpoint/mesh.h"
 #include "dpoint/seal.h"
 
-#define SIDE 12 /* squares of the mesh */
+#define SIDE 8 /* squares of the mesh */
 
 /* A rough square: quadrics of its points agree with their neighbours badly. Nothing of it is freed. */
 struct rough {
@@ -59,9 +59,10 @@ static void make_rough(struct rough *m, double height)
 }
 
 /* Whether a ray through the origin towards w meets z = (a x^2 + b y^2) / 2, moved by p, within the extents, with its
- * normal towards w and no further than `behind` behind the origin. By steps of a Newton iteration from both ends of what
+ * normal towards w, or either way if it has two sides, and no further than `behind` behind the origin. By steps of a Newton iteration from both ends of what
  * may count, in doubles. */
-static int is_stopped(const double p[3], const double w[3], const double l[2], const double extent[2], double behind)
+static int is_stopped(const double p[3], const double w[3], const double l[2], const double extent[2], double behind,
+                      int is_two_sided)
 {
 	for (int from = 0; from < 2; from++) {
 		double t = from ? 0.5 : -behind;
@@ -71,7 +72,7 @@ static int is_stopped(const double p[3], const double w[3], const double l[2], c
 			const double off = p[2] + t * w[2] - 0.5 * (l[0] * x * x + l[1] * y * y);
 			const double slope = w[2] - l[0] * x * w[0] - l[1] * y * w[1];
 
-			if (fabs(off) < 1e-12 && slope > 0 && t >= -behind && fabs(x) <= extent[0] && fabs(y) <= extent[1])
+			if (fabs(off) < 1e-12 && (slope > 0 || is_two_sided) && t >= -behind && fabs(x) <= extent[0] && fabs(y) <= extent[1])
 				return 1;
 			t -= off / (fabs(slope) > 1e-9 ? slope : 1e-9);
 		}
@@ -80,7 +81,7 @@ static int is_stopped(const double p[3], const double w[3], const double l[2], c
 }
 
 static int gets_through(const struct dpoint_surface *surface, const struct dpoint_choice *choice,
-                        const struct dpoint_cover_options *o, const double at[3], const double w[3])
+                        const struct dpoint_cover_options *o, const double at[3], const double w[3], double behind)
 {
 	for (size_t i = 0; i < surface->n_candidates; i++) {
 		const struct dpoint_candidate *c = &surface->candidate[i];
@@ -109,16 +110,18 @@ static int gets_through(const struct dpoint_surface *surface, const struct dpoin
 				r[k] += axis[k][j] * w[j];
 			}
 		}
-		if (is_stopped(p, r, l, wide, 6.001 * o->height))
+		if (is_stopped(p, r, l, wide, behind, o->is_two_sided != NULL))
 			return 0;
 	}
 	return 1;
 }
 
-/* Rays to the middles of cells and near their corners, of 0, 49 and 69.5 degrees to their planes' normals. */
+/* Rays to the middles of cells and near their corners, of 0, 49 and 69.5 degrees to their planes' normals; from behind of
+ * 83 as well, which get two and a half times as far. */
 static size_t count_through(const struct dpoint_surface *surface, const struct dpoint_choice *choice,
-                            const struct dpoint_cover_options *o)
+                            const struct dpoint_cover_options *o, int is_behind)
 {
+	static const double slant[] = { 0.35, 0.65, 0.12 };
 	size_t n = 0;
 
 	for (size_t i = 0; i < surface->n_cells; i++) {
@@ -131,12 +134,13 @@ static size_t count_through(const struct dpoint_surface *surface, const struct d
 		v3f_sub(b, cell->corner[3], cell->corner[1]);
 		v3f_cross(normal, a, b);
 		v3f_normalize(normal, normal);
-		v3f_scale(normal, normal, v3f_dot(normal, cell->normal) < 0 ? -1 : 1);
+		v3f_scale(normal, normal, (v3f_dot(normal, cell->normal) < 0) != is_behind ? -1 : 1);
 		dpoint_tangents(x, y, normal);
 		for (int place = 0; place < 5; place++)
-			for (int d = 0; d < 17; d++) {
-				const double angle = (d % 8 + 0.5) * (6.283185307179586 / 8);
-				const double cosine = d == 16 ? 1 : d < 8 ? 0.35 : 0.65, sine = sqrt(1 - cosine * cosine);
+			for (int d = -1; d < (is_behind ? 24 : 16); d++) {
+				const double angle = (d + 0.5) * (6.283185307179586 / 8);
+				const double cosine = d < 0 ? 1 : slant[d / 8], sine = sqrt(1 - cosine * cosine);
+				const double behind = (d < 16 ? 6.001 : 15.001) * (double)o->height;
 				double at[3], w[3];
 
 				for (int k = 0; k < 3; k++) {
@@ -146,25 +150,26 @@ static size_t count_through(const struct dpoint_surface *surface, const struct d
 					at[k] = place == 4 ? middle : middle + 0.9 * (cell->corner[place][k] - middle);
 					w[k] = cosine * normal[k] + sine * (cos(angle) * x[k] + sin(angle) * y[k]);
 				}
-				n += (size_t)gets_through(surface, choice, o, at, w);
+				n += (size_t)gets_through(surface, choice, o, at, w, behind);
 			}
 	}
 	return n;
 }
 
-static void no_ray_that_is_looked_at_gets_through(void **state)
+static void check_sealed(const uint8_t *is_two_sided)
 {
 	const struct dpoint_cover_options options = {
 		.sine = dpoint_sine(0.01), .slack = 1e-5f, .angle = 0.06f, .height = 0.002f, .overhang = 5e-4f,
+		.is_two_sided = is_two_sided,
 	};
 	const struct dpoint_mesh_options mesh = { .scale = 1, .cell = 0.1, .delta = 0.25f };
+	const int n_sides = is_two_sided != NULL ? 2 : 1;
 	struct rough *m = malloc(sizeof *m);
 	struct dpoint_surface surface;
 	struct dpoint_cover cover;
 	struct dpoint_choice choice;
 	size_t n_kept;
 
-	(void)state;
 	assert_non_null(m);
 	make_rough(m, 0.6);
 	/* Without it some do: else this would test nothing. */
@@ -176,9 +181,11 @@ static void no_ray_that_is_looked_at_gets_through(void **state)
 	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
 	assert_int_equal(choice.n_holes, 0);
 	n_kept = choice.n_kept;
-	assert_true(count_through(&surface, &choice, &options) > 0);
+	for (int side = 0; side < n_sides; side++)
+		assert_true(count_through(&surface, &choice, &options, side) > 0);
 	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
-	assert_int_equal(count_through(&surface, &choice, &options), 0);
+	for (int side = 0; side < n_sides; side++)
+		assert_int_equal(count_through(&surface, &choice, &options, side), 0);
 	assert_true(choice.n_kept > n_kept && choice.n_kept < surface.n_candidates);
 	/* And what is whole gets nothing. */
 	n_kept = choice.n_kept;
@@ -190,10 +197,23 @@ static void no_ray_that_is_looked_at_gets_through(void **state)
 	free(m);
 }
 
+static void no_ray_that_is_looked_at_gets_through(void **state)
+{
+	(void)state;
+	check_sealed(NULL);
+}
+
+static void none_along_the_back_of_two_sides_does(void **state)
+{
+	(void)state;
+	check_sealed((const uint8_t[]){ 1 });
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(no_ray_that_is_looked_at_gets_through),
+		cmocka_unit_test(none_along_the_back_of_two_sides_does),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
