@@ -40,6 +40,7 @@
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 #include "patches.h"
+#include "whole.h"
 
 namespace {
 
@@ -219,12 +220,20 @@ void walk::visit(const TDF_Label &label, const TopLoc_Location &location, uint32
 	}
 }
 
+void expect_whole(STEPCAFControl_Reader &reader)
+{
+	cad_expect_whole(reader.ChangeReader().WS()->Model());
+}
+
+void expect_whole(IGESCAFControl_Reader &) {}
+
 template <typename Reader> void transfer(Reader &reader, const Handle(TDocStd_Document) &document, const char *path)
 {
 	reader.SetColorMode(Standard_True);
 	reader.SetNameMode(Standard_True);
 	if (reader.ReadFile(path) != IFSelect_RetDone)
 		throw cad_failure(PSR_ERR_FORMAT, "its entities cannot be parsed");
+	expect_whole(reader);
 	Handle(TDocStd_Document) to = document;
 	if (!reader.Transfer(to))
 		throw cad_failure(PSR_ERR_FORMAT, "none of its shapes can be read");

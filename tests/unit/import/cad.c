@@ -270,6 +270,42 @@ static void a_file_that_ends_in_the_middle_is_told(void **state)
 	expect_end("tests/data/import/pins.iges", "cut.igs", "the IGES file ends in the middle");
 }
 
+/* Without any one of its entities the file is read, with what can be, or refused, and then what lacks it is named. */
+static void an_entity_that_is_missing_ends_nothing_else(void **state)
+{
+	uint8_t *bytes = NULL, *rest;
+	size_t n = 0, n_refused = 0, n_named = 0;
+
+	(void)state;
+	if (!has_module)
+		skip();
+	assert_int_equal(infile_read(&bytes, &n, "tests/data/import/pins.step", 1 << 20, NULL), PSR_OK);
+	rest = malloc(n);
+	assert_non_null(rest);
+	for (size_t begin = 1, end; begin < n; begin = end) {
+		struct psr_mesh *mesh = NULL;
+		struct psr_error err = { 0, "" };
+		int rc;
+
+		for (end = begin + 1; end < n && !(bytes[end] == '#' && bytes[end - 1] == '\n'); end++)
+			;
+		/* The last of them goes on to the end of the file. */
+		if (bytes[begin] != '#' || end == n)
+			continue;
+		memcpy(rest, bytes, begin);
+		memcpy(rest + begin, bytes + end, n - end);
+		write_bytes(path_of("lacks.step"), rest, n - (end - begin));
+		rc = psr_mesh_import(&mesh, path_of("lacks.step"), NULL, &err);
+		assert_true(rc == PSR_OK || rc == PSR_ERR_FORMAT);
+		n_refused += rc != PSR_OK;
+		n_named += rc != PSR_OK && strstr(err.text, "refers to an entity that it does not have (Unresolved Reference, Ent.Id.#") != NULL;
+		psr_mesh_destroy(mesh);
+	}
+	assert_true(n_named > 0 && n_named <= n_refused);
+	free(bytes);
+	free(rest);
+}
+
 /* Text with the frame of a file, whose entities are none, is Open CASCADE's to refuse. */
 static void other_contents_are_told(void **state)
 {
@@ -315,6 +351,7 @@ int main(void)
 		cmocka_unit_test(faces_without_a_patch_have_fine_triangles),
 		cmocka_unit_test(threads_change_nothing),
 		cmocka_unit_test(a_file_that_ends_in_the_middle_is_told),
+		cmocka_unit_test(an_entity_that_is_missing_ends_nothing_else),
 		cmocka_unit_test(other_contents_are_told),
 	};
 
