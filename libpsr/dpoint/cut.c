@@ -232,10 +232,29 @@ static int look_at(struct seen *seen, const struct cutting *c, const struct piec
 	return PSR_OK;
 }
 
+/* What was cut out ends rectangles, as what is beyond a border does. */
+static int put_absent(const struct cutting *c, const struct piece *p)
+{
+	struct dpoint_local local;
+	struct dpoint_cell *cell;
+
+	if (c->surface->n_cells > CUT_MOST_PIECES)
+		return PSR_ERR_LIMIT;
+	cell = dpoint_surface_cell(c->surface);
+	if (cell == NULL)
+		return PSR_ERR_MEMORY;
+	cell_of(cell, &local, c, p);
+	cell->part = DPOINT_BEYOND;
+	cell->attr = 0;
+	return PSR_OK;
+}
+
 static int put_seen(const struct cutting *c, const struct piece *p, const struct seen *seen)
 {
-	if (seen->kind != SEEN_EVEN || seen->is_absent)
+	if (seen->kind != SEEN_EVEN)
 		return PSR_OK;
+	if (seen->is_absent)
+		return put_absent(c, p);
 	return put(c, p, look_range_middle(&seen->range));
 }
 

@@ -116,6 +116,8 @@ static int put_pieces_as_facets(struct dpoint_surface *surface, struct dpoint_su
 	for (size_t i = 0; i < pieces->n_cells && rc == PSR_OK; i++) {
 		const float (*corner)[3] = (const float (*)[3])pieces->cell[i].corner;
 
+		if (pieces->cell[i].part == DPOINT_BEYOND)
+			continue;
 		rc = facets_add(&surface->facets, corner[0], corner[1], corner[2]);
 		if (rc == PSR_OK && memcmp(corner[2], corner[3], sizeof corner[2]) != 0)
 			rc = facets_add(&surface->facets, corner[0], corner[2], corner[3]);

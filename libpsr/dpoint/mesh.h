@@ -18,7 +18,7 @@ struct dpoint_mesh_options {
 	/* With an error: cells are cut further until rectangles around them can be within it. NULL, or 0: they are not. */
 	const struct dpoint_cover_options *cover;
 	/* Tells the attributes of the place v0 + u (v1 - v0) + v (v2 - v0) of a triangle, without a normal. Returns 0 where
-	 * there is no surface: then there is no cell. NULL: attributes are 0. */
+	 * there is no surface: then the cell is beyond it. NULL: attributes are 0. */
 	int (*look)(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr);
 	void *userdata;
 };

@@ -171,6 +171,74 @@ static void no_extent_crosses_an_edge(void **state)
 	free(m);
 }
 
+#define CUT_OUT 0.2
+
+static int is_beside_cut_out(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr)
+{
+	const struct grid_mesh *m = userdata;
+	const uint32_t *corner = m->triangle[triangle];
+	double at[3];
+
+	for (int k = 0; k < 3; k++)
+		at[k] = (1 - u - v) * m->position[corner[0]][k] + u * m->position[corner[1]][k] + v * m->position[corner[2]][k];
+	*attr = 0;
+	return !(fabs(at[0]) < CUT_OUT && fabs(at[1]) < CUT_OUT);
+}
+
+/* A piece is there if its middle is, so what is there ends within a piece, 1.5 grains; rectangles reach over that as over a
+ * border, and those that mend by a cell, which is no larger. */
+static void no_extent_crosses_what_is_cut_out(void **state)
+{
+	const struct dpoint_cover_options options = {
+		.sine = dpoint_sine(0.01), .slack = 1e-5f, .angle = 0.05f, .height = 0.005f, .overhang = OVERHANG,
+	};
+	const double grain = 0.01, inside = CUT_OUT - 2 * 1.5 * grain - 2 * (double)OVERHANG - 0.25 * 0.012;
+	struct grid_mesh *m = malloc(sizeof *m);
+	struct psr_material material = { .alpha = PSR_ALPHA_MASK };
+	const struct dpoint_mesh_options mesh = { .scale = 1, .cell = 0.05, .delta = 0.25f, .grain_of = &grain,
+		                                      .look = is_beside_cut_out, .userdata = m };
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+	size_t n_facets = 0;
+
+	(void)state;
+	assert_non_null(m);
+	cube_mesh(m);
+	m->mesh.n_triangles = 2;
+	m->mesh.material = &material;
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &mesh, NULL), PSR_OK);
+	choose_all(&surface, &cover, &choice, &options);
+	for (size_t i = 0; i < surface.n_candidates; i++) {
+		const struct dpoint_candidate *c = &surface.candidate[i];
+		float v[3];
+
+		v3f_cross(v, c->point.normal, c->point.u);
+		for (int place = 0; place < 21 * 21 && choice.is_kept[i]; place++) {
+			float at[3];
+
+			v3f_add_scaled(at, c->point.at, c->delta[0] * (float)(place % 21 - 10) / 10, c->point.u);
+			v3f_add_scaled(at, at, c->delta[1] * (float)(place / 21 - 10) / 10, v);
+			assert_false(fabs((double)at[0]) < inside && fabs((double)at[1]) < inside);
+		}
+	}
+	/* Nor is there a facet. */
+	for (size_t f = 0; f < surface.facets.n; f++) {
+		double middle[2] = { 0, 0 };
+
+		for (int i = 0; i < 3; i++)
+			for (int k = 0; k < 2; k++)
+				middle[k] += (double)surface.facets.facet[f].corner[i][k] / 3;
+		n_facets += fabs(middle[0]) < inside && fabs(middle[1]) < inside;
+	}
+	assert_int_equal(n_facets, 0);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+	free(m);
+}
+
 /* After the fit, what is under a rectangle suits it: normals are within the angle wherever the surface goes on. */
 static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 {
@@ -416,6 +484,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(pieces_of_round_meshes_have_their_curvatures),
 		cmocka_unit_test(no_extent_crosses_an_edge),
+		cmocka_unit_test(no_extent_crosses_what_is_cut_out),
 		cmocka_unit_test(under_a_fitted_rectangle_normals_are_within_the_angle),
 		cmocka_unit_test(two_turns_cover_all_with_little_more),
 		cmocka_unit_test(mending_leaves_no_hole),
