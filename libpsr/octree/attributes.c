@@ -68,7 +68,8 @@ static inline __attribute__((always_inline)) unsigned code_counted(struct job *j
 }
 
 /* rate: of older packings. */
-static inline __attribute__((always_inline)) unsigned code_bit(struct job *job, uint32_t *p, unsigned rate, unsigned bit)
+static inline __attribute__((always_inline)) unsigned code_bit(struct job *job, uint32_t *p, unsigned rate,
+                                                               unsigned bit)
 {
 	if (!job->is_older)
 		return job->is_decoding ? code_counted(job, 1, p, 0) : code_counted(job, 0, p, bit);
