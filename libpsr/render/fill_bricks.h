@@ -1,4 +1,4 @@
-/* Pull and push of bricks, and how far filled pixels are from samples, for fill.c. */
+/* Pull and push of bricks and of coarser cells, and how far filled pixels are from samples, for fill.c. */
 #ifndef PSR_RENDER_FILL_BRICKS_H
 #define PSR_RENDER_FILL_BRICKS_H
 
@@ -48,6 +48,15 @@ static inline void fill_note_depth(struct fill *fill, int level)
 }
 
 enum fill_coarse { FILL_PULLED = 1, FILL_NEEDED = 2 };
+
+/* Finds the bricks and coarse cells needed by bricks that are not whole at their own level: upwards until all needed
+ * cells are whole, or to the top. Pulls weights and depths of these cells. */
+void fill_find_coarse(struct fill *fill);
+
+/* Pulls and pushes the levels with cells larger than a brick. All of their cells, since they are few; cells that
+ * fill_find_coarse() did not pull are undefined, and nothing reads them. */
+void fill_run_coarse(struct fill *fill);
+
 /* Pulls weights and depths of bricks bx0..bx1-1 of brick row `by` from the finer level to `level`; returns the least
  * weight. */
 uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
