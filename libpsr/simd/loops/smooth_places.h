@@ -1,0 +1,114 @@
+/* What samples weigh in smoothing, by where in their pixels they lie. */
+#ifndef PSR_SIMD_LOOPS_SMOOTH_PLACES_H
+#define PSR_SIMD_LOOPS_SMOOTH_PLACES_H
+
+#include <stddef.h>
+#include <string.h>
+#include "base/maths.h"
+#include "simd/gaps.h"
+#include "simd/smooth.h"
+
+#define SMOOTH_RUN 16 /* pixels together: the fewer, the more runs are of one surface */
+#define SMOOTH_MEAN 256.0f /* of 128^2: what the mean of a surface's pixels weighs beside its samples */
+
+/* Masks of the neighbours that count. */
+struct smooth_masks {
+	int32_t above, below, left, right, corner[4];
+};
+
+static inline float masked(float value, int32_t mask)
+{
+	return psr_float_from_bits(psr_bits_from_float(value) & (uint32_t)mask);
+}
+
+/* What the samples of a row weigh, of 128: [k][i] of pixel i - 1 of the piece in the one before it (k 0), in its own
+ * and in the one behind it, by their columns and by their rows. */
+struct smooth_weights {
+	float across[3][SMOOTH_WIDTH + 2], down[3][SMOOTH_WIDTH + 2];
+	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN]; /* by run and a pixel more on each side */
+};
+
+/* A quadratic B-spline at the eighths 1, 3, 5 and 7 of a pixel: 3/4 - d^2 at a distance d of up to a half of the
+ * middle, (3/2 - d)^2 / 2 up to one and a half. */
+static inline void weigh_quarter(float *before, float *own, float *after, int32_t quarter, int32_t is_there)
+{
+	const int32_t from = 2 * quarter + 1, to = 7 - 2 * quarter, off = 2 * quarter - 3;
+
+	*before = (float)(to * to & is_there);
+	*own = (float)((96 - 2 * off * off) & is_there);
+	*after = (float)(from * from & is_there);
+}
+
+static void load_weights(struct smooth_weights *w, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
+{
+	const int is_inside = y >= 0 && y < (int64_t)t->height;
+	const size_t first = x0 == 0, left = t->width + 1 - x0, end = left < n + 2 ? left : n + 2;
+	uint8_t place[SMOOTH_WIDTH + 2];
+
+	memset(place, PSR_PLACE_NONE, sizeof place);
+	if (is_inside)
+		memcpy(place + first, t->place + (size_t)y * t->width + x0 + first - 1, end - first);
+	for (size_t i = 0; i < SMOOTH_WIDTH + 2; i++) {
+		const int32_t code = place[i], is_there = -(code < PSR_PLACE_NONE);
+
+		weigh_quarter(&w->across[0][i], &w->across[1][i], &w->across[2][i], code & 3, is_there);
+		weigh_quarter(&w->down[0][i], &w->down[1][i], &w->down[2][i], code >> 2 & 3, is_there);
+	}
+	for (size_t k = 0; k < SMOOTH_WIDTH / SMOOTH_RUN; k++) {
+		uint8_t least = PSR_PLACE_NONE;
+
+		for (size_t i = 0; i < SMOOTH_RUN + 2; i++)
+			least = place[k * SMOOTH_RUN + i] < least ? place[k * SMOOTH_RUN + i] : least;
+		w->has_any[k] = least < PSR_PLACE_NONE;
+	}
+}
+
+/* The weights of the samples in a pixel and around it, by row, and what to multiply eighths of all with. */
+struct smooth_shares {
+	float row[3][3], whole;
+};
+
+static inline float weight_of(const struct smooth_weights *w, int j, int i, size_t x)
+{
+	return w->across[1 - i][x + (size_t)(1 + i)] * w->down[1 - j][x + (size_t)(1 + i)];
+}
+
+/* Of pixel x; `w` points to the three rows around it. */
+static inline void find_shares_around(struct smooth_shares *s, const struct smooth_weights *const *w, size_t x,
+                                      const struct smooth_masks *m)
+{
+	const int32_t above[3] = { m->corner[0], m->above, m->corner[1] }, beside[3] = { m->left, -1, m->right };
+	const int32_t below[3] = { m->corner[2], m->below, m->corner[3] };
+	float all = 0;
+
+	for (int i = -1; i <= 1; i++) {
+		s->row[0][1 + i] = masked(weight_of(w[0], -1, i, x), above[1 + i]);
+		s->row[1][1 + i] = masked(weight_of(w[1], 0, i, x), beside[1 + i]);
+		s->row[2][1 + i] = masked(weight_of(w[2], 1, i, x), below[1 + i]);
+	}
+	for (int j = 0; j < 3; j++)
+		all += (s->row[j][0] + s->row[j][1]) + s->row[j][2];
+	s->whole = 8 / (all + SMOOTH_MEAN);
+}
+
+/* Eight times the light of samples, and of the mean of which `mean` is eight times as much. */
+static inline float add_shares(const float *a, const float *o, const float *b, const struct smooth_shares *s,
+                               float mean)
+{
+	const float above = (a[-1] * s->row[0][0] + a[0] * s->row[0][1]) + a[1] * s->row[0][2];
+	const float beside = (o[-1] * s->row[1][0] + o[0] * s->row[1][1]) + o[1] * s->row[1][2];
+	const float below = (b[-1] * s->row[2][0] + b[0] * s->row[2][1]) + b[1] * s->row[2][2];
+
+	return (((above + beside) + below) + mean * (SMOOTH_MEAN / 8)) * s->whole;
+}
+
+static void smooth_places(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
+{
+	for (uint32_t x = 0; x < n; x++) {
+		const int is_there = word[x] != PSR_WORD_EMPTY && weight[x] >= GAPS_WHOLE / 2;
+
+		place[x] = is_there ? (uint8_t)(word[x] & ((1 << PSR_PLACE_BITS) - 1)) : PSR_PLACE_NONE;
+	}
+}
+
+#endif
