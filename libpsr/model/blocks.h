@@ -19,9 +19,10 @@ struct psr_projection {
 #define PSR_MAX_LEVELS 8
 
 /* How far a sample may be from the surface that it shows, before its depth is rounded, in spacings of its level
- * (psr_model_info): the modeller moves some to lattice points. In blocks that say so, it is the greater one. */
+ * (psr_model_info): the modeller moves some to lattice points. FAR: in blocks that say so. OLD: in files before 6.6. */
 #define PSR_SAMPLE_OFF 0.25
-#define PSR_SAMPLE_MOST_OFF 0.55
+#define PSR_SAMPLE_FAR_OFF 0.4
+#define PSR_SAMPLE_OLD_OFF 0.55
 
 /* A byte a block. */
 enum psr_block_flag {
@@ -42,8 +43,10 @@ enum psr_block_trait {
 	/* A sheer block of things narrower than a sample's cell: an opacity is the share that they cover of a disc about
 	 * the sample, as wide as a step of the lattice. */
 	PSR_BLOCK_THIN = 4,
-	/* Some samples are up to PSR_SAMPLE_MOST_OFF off the surface. */
-	PSR_BLOCK_OFF = 8
+	/* Some samples are up to PSR_SAMPLE_FAR_OFF off the surface. */
+	PSR_BLOCK_OFF = 8,
+	/* Up to PSR_SAMPLE_OLD_OFF. Of all blocks of a file, which does not say so. */
+	PSR_BLOCK_OLD = 16
 };
 
 /* A run is PSR_RUN_BLOCKS blocks in a row: their numbers have the same quotient. It stores what is equal or near for
@@ -86,7 +89,7 @@ struct psr_blocks {
 	const int8_t *cone_x, *cone_y, *cone_z;
 	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
 	const uint8_t *traits;                  /* enum psr_block_trait; not without cones */
-	uint8_t traits_of_all;                  /* those that all blocks have: PSR_BLOCK_OFF of files before 6.6, or 0 */
+	uint8_t traits_of_all;                  /* those that all blocks have: PSR_BLOCK_OLD of files before 6.6, or 0 */
 	const uint8_t *opacity;                 /* a sample, of PSR_OPAQUE; not without traits. NULL: all are opaque */
 	const uint8_t *visibility_index;        /* see psr_blocks_visibility() */
 	const uint64_t (*visibility_mask)[2];   /* 128 bits, one a triangle of directions; many blocks share one */

@@ -292,7 +292,7 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 /* The first version that knows all sections. */
 static unsigned minor_of(const struct content *content)
 {
-	if (content->blocks.n_blocks != 0 && !(content->blocks.traits_of_all & PSR_BLOCK_OFF))
+	if (content->blocks.n_blocks != 0 && !(content->blocks.traits_of_all & PSR_BLOCK_OLD))
 		return FILE_MINOR_OFF;
 	if (is_present(SECTION_DELTAS, content))
 		return FILE_MINOR_DELTAS;

@@ -339,7 +339,7 @@ static int get_arrays(const struct reader *r, struct content *content)
 	}
 	/* Before that version the modeller moved samples further without saying which. */
 	if (blocks->n_blocks != 0 && file_get(r->bytes + HEADER_MINOR, 2) < FILE_MINOR_OFF)
-		content->blocks.traits_of_all = PSR_BLOCK_OFF;
+		content->blocks.traits_of_all = PSR_BLOCK_OLD;
 	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
 		return bad(r, "some of the sections CONX, CONY, CONZ and CONS are missing");
 	if (blocks->traits && !blocks->cone_x)

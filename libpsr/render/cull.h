@@ -128,6 +128,8 @@ static inline float cull_place_error(const struct plan *plan, const struct plan_
                                      float apart, float depth_error)
 {
 	const float half = 0.70710678f;
+	const float off =
+		(float)(traits & PSR_BLOCK_OLD ? PSR_SAMPLE_OLD_OFF : traits & PSR_BLOCK_OFF ? PSR_SAMPLE_FAR_OFF : PSR_SAMPLE_OFF);
 	float drawn = half;
 
 	if (plan->with_ewa && in->cull.cubes != NULL)
@@ -136,7 +138,7 @@ static inline float cull_place_error(const struct plan *plan, const struct plan_
 		drawn = DISC_RADIUS * apart > half ? DISC_RADIUS * apart : half;
 	else if (traits & PSR_BLOCK_THIN && apart >= 2)
 		drawn = half * (apart + 1);
-	return drawn + (float)(traits & PSR_BLOCK_OFF ? PSR_SAMPLE_MOST_OFF : PSR_SAMPLE_OFF) * apart + depth_error;
+	return drawn + off * apart + depth_error;
 }
 
 /* Visibility masks of the screen's regions, for one instance ([G] 6.3): one mask for each of the 10 x 10 ranges of

@@ -10,6 +10,8 @@
 /* pixels off its plane: surfaces are rough, but half a pixel off is another surface */
 #define OFF_TRIANGLE 0.4
 
+#define MOST_AWAY 0.55 /* pixels from its place to where a sample is moved */
+
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
 
@@ -186,11 +188,13 @@ static void find_moves(struct candidates *candidates, const struct keeper *keepe
 		dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
 		away = sqrt(dx * dx + dy * dy + dz * dz) / ds;
 		cost = MOVE + aside + (is_textured ? MOVE_TEXTURE : MOVE_AWAY) * (float)away;
-		if (away > PSR_SAMPLE_MOST_OFF || cost >= most)
+		if (away > MOST_AWAY || cost >= most)
 			continue;
 		z = p[2] + (float)dz;
 		projection_inner(&sheets->projection, x, y, (double)z, inner);
 		off = fmin(ray_scene_distance(keeper->sampling->scene, inner, away * ds) / ds, away); /* the place is there */
+		if (off > PSR_SAMPLE_FAR_OFF)
+			continue;
 		cost += MOVE_AWAY * (float)off + (off > PSR_SAMPLE_OFF ? LAST_RESORT : 0);
 		candidates->move[candidates->n_moves++] = (struct candidate_move){ q, cost, z, corner[k].at };
 	}

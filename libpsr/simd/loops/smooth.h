@@ -8,6 +8,7 @@
 
 #define MARGIN SMOOTH_REACH
 #define ROWS (2 * MARGIN + 1)
+
 /* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane:
  * 1 / z' in perspective, else -z'. NaN outside of the picture: every comparison fails. */
 struct smooth_row {
