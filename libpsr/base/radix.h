@@ -13,8 +13,8 @@ struct radix_entry {
 /* The order of finite numbers; both zeros are one. */
 uint32_t radix_of_float(float x);
 
-/* Sorts n entries by their keys; those of one key stay in their order. There is room for 2 n: the second half is for its
- * use. */
+/* Sorts n entries by their keys; those of one key stay in their order. There is room for 2 n: the second half is for
+ * its use. */
 void radix_sort(struct radix_entry *entry, size_t n);
 
 #endif

@@ -4,8 +4,8 @@
 
 #include <Interface_InterfaceModel.hxx>
 
-// Throws a cad_failure if an entity refers to one that is not there: Open CASCADE goes on with nothing in its place, and
-// most of its translators fall over that. Or if a coordinate is beyond all numbers, as 1.E400: then some never end.
+// Throws a cad_failure if an entity refers to one that is not there: Open CASCADE goes on with nothing in its place,
+// and most of its translators fall over that. Or if a coordinate is beyond all numbers, as 1.E400: then some never end.
 void cad_expect_whole(const Handle(Interface_InterfaceModel) &model);
 
 #endif

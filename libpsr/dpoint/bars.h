@@ -18,8 +18,8 @@ struct bars {
 };
 
 /* Tells where a cell begins, and on which side, by those of its corners that are nearest to S_p: the others of a face
- * that falls away lean over or under the rectangle, and do not touch it. Corners are in the rectangle's frame; above: how
- * far each is from S_p; those that are further by more than `height` than the nearest do not count. */
+ * that falls away lean over or under the rectangle, and do not touch it. Corners are in the rectangle's frame; above:
+ * how far each is from S_p; those that are further by more than `height` than the nearest do not count. */
 struct bar bar_of(const float corner[4][3], const float above[4], float height);
 
 /* Returns whether a bar is nearer along both sides: what is behind it ends nothing. */
@@ -28,8 +28,8 @@ int bars_is_behind(const struct bars *bars, float u, float v);
 /* Adds a bar, unless it is behind another one, and takes away what is behind it. Sets is_failed without memory. */
 void bars_put(struct bars *bars, const struct bar *bar);
 
-/* Makes the extents those of the best rectangle that no bar is in, and that holds the free one: along u it ends at a bar,
- * along v at the least of those before. */
+/* Makes the extents those of the best rectangle that no bar is in, and that holds the free one: along u it ends at a
+ * bar, along v at the least of those before. */
 void bars_end(float extent[2], const struct bars *bars, const float free_one[2], float overhang);
 
 /* Returns which side the bar is on that ends an extent; 0: none does. */

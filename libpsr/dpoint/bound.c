@@ -217,8 +217,8 @@ static int any_suffices(const struct bounding *b, const struct part *part, const
 	return 0;
 }
 
-/* Facets are those of the list from `begin` on. likely: one that is tried first, as it was near to what the part was cut
- * from; or NULL. A short list is looked through before it becomes shorter: that often is the end of it. */
+/* Facets are those of the list from `begin` on. likely: one that is tried first, as it was near to what the part was
+ * cut from; or NULL. A short list is looked through before it becomes shorter: that often is the end of it. */
 static int part_holds(const struct bounding *b, const struct part *part, size_t begin, int depth,
                       const struct bound_seen *likely)
 {

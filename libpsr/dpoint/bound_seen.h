@@ -8,8 +8,8 @@
 typedef double bound_pair __attribute__((vector_size(16)));
 typedef int64_t bound_pair_if __attribute__((vector_size(16))); /* of a comparison: -1 or 0 */
 
-/* A box: x and y of the low corner, its z and that of the high one, x and y of the high one; the high one's with the other
- * sign, so that of two boxes that meet all numbers of one are at most those of the other, turned. */
+/* A box: x and y of the low corner, its z and that of the high one, x and y of the high one; the high one's with the
+ * other sign, so that of two boxes that meet all numbers of one are at most those of the other, turned. */
 struct bound_box {
 	bound_pair side[3];
 };
@@ -39,9 +39,9 @@ static inline int bound_is_apart(const struct bound_box *box, const struct bound
 
 struct bound_seen {
 	struct bound_box box;
-	bound_pair plane[2][4];                       /* of the sides, in the facet's plane across, which a place beyond is below,
-	                                               * and the facet's own, with a unit normal: x, y, z and a number, the sum of
-	                                               * which is 0 on them; all is below those of slivers */
+	/* Planes through the sides, across the facet, which places beyond are below, and the facet's own, whose normal is of
+	 * unit length: x, y, z, and what makes sums 0 on them. All is below those of slivers. */
+	bound_pair plane[2][4];
 	double corner[3][3], side[3][3], per_side[3]; /* side i is from corner i to the next; 1 / its square, or 0 */
 };
 

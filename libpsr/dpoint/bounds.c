@@ -8,8 +8,8 @@
 #define LEAST 1e-5
 #define STEPS 4       /* of halving a factor of two */
 #define SAMPLE 8      /* of so many chunks the first is measured before all */
-/* Of the worst distance that is known: points that bound_holds() is 1 for at so much come out below it. Its 0 is wrong by
- * 3 % at most, and halving ends 1/16 above a 0: 1.03 * 1.0625 = 1.095 times as far as the point is at most. */
+/* Of the worst distance that is known: points that bound_holds() is 1 for at so much come out below it. Its 0 is wrong
+ * by 3 % at most, and halving ends 1/16 above a 0: 1.03 * 1.0625 = 1.095 times as far as the point is at most. */
 #define SAFE (1 / 1.15)
 
 struct measuring {
@@ -19,8 +19,8 @@ struct measuring {
 	struct dpoint_bounds *of_chunk;
 	double worst;  /* some chunk's: what is certainly below it is not measured */
 	int n_chunks;
-	int stride;    /* this turn measures each stride-th chunk from the last on, where points that mend are, which may be far
-	                * off; 0: the others */
+	int stride;    /* this turn measures each stride-th chunk from the last on, where points that mend are, which may be
+	                * far off; 0: the others */
 	int is_failed;
 };
 

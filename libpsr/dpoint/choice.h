@@ -50,8 +50,8 @@ void choice_fini(struct heap *heap, struct tally *tally);
 /* Leaves out kept candidates whose cells are all covered by others, the lowest key first. */
 void choice_prune(struct dpoint_choice *choice, struct heap *heap, struct tally *tally);
 
-/* Exchanges kept candidates for others that cover what these cover alone, as long as it saves points. All cells that were
- * covered stay so. MEMORY. */
+/* Exchanges kept candidates for others that cover what these cover alone, as long as it saves points. All cells that
+ * were covered stay so. MEMORY. */
 int choice_swap(struct dpoint_choice *choice, const struct dpoint_cover *cover);
 
 /* Counts what is kept, and holes. */

@@ -159,8 +159,11 @@ static void sort_leaves(struct radix_entry *leaf, const struct cell_tree *tree, 
 		}
 	for (int k = 0; k < 3; k++)
 		axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
-	for (uint32_t i = 0; i < all->end; i++)
-		leaf[i].key = (uint64_t)radix_of_float(tree->ball[leaf[i].value].middle[axis]) << 32 | (UINT32_MAX - leaf[i].value);
+	for (uint32_t i = 0; i < all->end; i++) {
+		const uint32_t node = leaf[i].value;
+
+		leaf[i].key = (uint64_t)radix_of_float(tree->ball[node].middle[axis]) << 32 | (UINT32_MAX - node);
+	}
 	radix_sort(leaf, all->end);
 }
 

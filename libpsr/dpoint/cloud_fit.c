@@ -66,8 +66,9 @@ static void begin(struct cloud_fit *fit, const struct dpoint_cloud *cloud, uint3
 }
 
 /* Over a rectangle of half a side e a normal is off by e times the curvature's error. Of heights with errors of `off`,
- * n of them evenly within a circle of radius r, that is 8.5 off / (sqrt(n) r^2): x^2 has the variance 1/16 over the unit
- * circle, and -1/48 with y^2. What rounds a crease off is bent so much that this is little; its residuals are not. */
+ * n of them evenly within a circle of radius r, that is 8.5 off / (sqrt(n) r^2): x^2 has the variance 1/16 over the
+ * unit circle, and -1/48 with y^2. What rounds a crease off is bent so much that this is little; its residuals are
+ * not. */
 static double turn_of(const struct fitting *f, const struct cloud_fit *fit, uint32_t n)
 {
 	const double *s = fit->local.shape, error = 8.5 * fit->off / (sqrt((double)n) * fit->reach * fit->reach);

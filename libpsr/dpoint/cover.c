@@ -78,7 +78,8 @@ size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate)
 	return n;
 }
 
-static void keep_margin(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options)
+static void keep_margin(struct rectangle *r, const struct dpoint_candidate *c,
+                        const struct dpoint_cover_options *options)
 {
 	for (int k = 0; k < 2; k++)
 		if (r->extent[k] < c->delta[k] || c->delta[k] >= options->delta)

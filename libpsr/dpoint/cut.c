@@ -127,7 +127,8 @@ static void weigh_corners(double weight[4][3], const struct cutting *c, const st
 		memcpy(weight[2], weight[3], sizeof weight[2]);
 }
 
-/* Whether the point's rectangle around the cell is within the bound. Where there is no point there is nothing to mend. */
+/* Whether the point's rectangle around the cell is within the bound. Where there is no point there is nothing to
+ * mend. */
 static int is_within(const struct cutting *c, const struct dpoint_cell *cell, const struct dpoint_local *local,
                      const struct dpoint_candidate *like)
 {

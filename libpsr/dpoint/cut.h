@@ -38,8 +38,8 @@ static inline uint32_t cut_parts(const struct cutting *c, int side)
 
 /* Adds the pieces: parallelograms along the two shorter sides, and what the longest one leaves of them along it. Where
  * looks differ they are quarters, and so on down to grains; where normals turn by more than options->turn, or a
- * rectangle of the piece's own point around it is not within the bound, quarters down to units. MEMORY; LIMIT: more than
- * CUT_MOST_PIECES cells. */
+ * rectangle of the piece's own point around it is not within the bound, quarters down to units. MEMORY; LIMIT: more
+ * than CUT_MOST_PIECES cells. */
 int cut(const struct cutting *c);
 
 #endif

@@ -42,8 +42,8 @@ enum dpoint_made dpoint_make(struct dpoint *out, const struct dpoint_local *loca
 /* ---- 16 bytes ---- */
 
 struct dpoint_word {
-	/* From bit 0: x, y, z (12 each), two steps from the attributes' normal (3 each), angle of u (7), lambda_u (8: sign in
-	 * the highest), rho (7). */
+	/* From bit 0: x, y, z (12 each), two steps from the attributes' normal (3 each), angle of u (7), lambda_u (8: sign
+	 * in the highest), rho (7). */
 	uint64_t place;
 	uint64_t attr;
 };
@@ -65,7 +65,8 @@ struct dpoint_box {
 /* Makes a box that reaches from low to high at least; low <= high, finite, below 2^10 in magnitude. */
 void dpoint_box_make(struct dpoint_box *box, const float low[3], const float high[3]);
 
-/* Packs a point to the nearest word; to the same one if it was unpacked, and its attributes' normal was left alone. What dpoint_unpack() then gives differs from it by at most:
+/* Packs a point to the nearest word; to the same one if it was unpacked, and its attributes' normal was left alone. What
+ * dpoint_unpack() then gives differs from it by at most:
  *   place       half a step of the box and 2^-22 of its greatest coordinate, on each axis; it is inside of the box
  *   normal      half a step along each tangent, 0.23 degrees in all
  *   direction   pi / 256 around the normal, after it was brought to the tangent plane of the new one
@@ -77,7 +78,10 @@ void dpoint_pack(struct dpoint_word *word, const struct dpoint *point, const str
 void dpoint_unpack(struct dpoint *point, const struct dpoint_word *word, const struct dpoint_box *box);
 
 /* What codes of a word stand for, for kernels that unpack many. */
-enum { DPOINT_PLACE_BITS = 12, DPOINT_FINE_BITS = 3, DPOINT_FINE_AT = 36, DPOINT_ANGLE_AT = 42, DPOINT_LAMBDA_AT = 49, DPOINT_RHO_AT = 57 };
+enum {
+	DPOINT_PLACE_BITS = 12, DPOINT_FINE_BITS = 3, DPOINT_FINE_AT = 36, DPOINT_ANGLE_AT = 42, DPOINT_LAMBDA_AT = 49,
+	DPOINT_RHO_AT = 57,
+};
 struct dpoint_tables {
 	float lambda[256];             /* with its sign */
 	float turn[DPOINT_ANGLES][2];  /* cosine and sine of an angle from the first tangent */
@@ -156,9 +160,9 @@ static inline void dpoint_extent(float extent[2], const struct dpoint *point, co
 
 /* Quadrics of neighbours end at slightly different heights, and a sight that grazes them would pass between. Where it
  * leans by the tangent t to a point's normal, along u or v, it sees the rectangle reach further over those sides: by t
- * times a sixteenth of a sample, which is as wide a strip across the sight, up to DPOINT_GRAZES of them (decision 0158).
- * Where it goes along that side, too, it sees such a strip from its narrow end, which is why that is kept short. Seen
- * from the front, the rectangle is as it is. */
+ * times a sixteenth of a sample, which is as wide a strip across the sight, up to DPOINT_GRAZES of them (decision
+ * 0158). Where it goes along that side, too, it sees such a strip from its narrow end, which is why that is kept short.
+ * Seen from the front, the rectangle is as it is. */
 #define DPOINT_GRAZES 8
 
 /* A sixteenth of a sample of a model, inner units; of coarse ones, 2^-8. */

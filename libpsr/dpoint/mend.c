@@ -7,8 +7,8 @@
 #include "choice.h"
 #include "rectangle.h"
 
-/* Along a side of a cell, and across it: half of what the cell takes of both, from its middle on. next: the side comes so
- * many after the longest. is_own: with the normal of the cell's plane, and not that of the surface. */
+/* Along a side of a cell, and across it: half of what the cell takes of both, from its middle on. next: the side comes
+ * so many after the longest. is_own: with the normal of the cell's plane, and not that of the surface. */
 static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell, int next,
                          int is_own)
 {
@@ -203,7 +203,8 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	rc = tally_init(&tally, cover);
 	if (rc == PSR_OK)
 		tally_add_all(&tally);
-	/* Rims cut cells of patches to slanted pieces: a rectangle along the longest side of such a one may go far beyond. */
+	/* Rims cut cells of patches to slanted pieces: a rectangle along the longest side of such a one may go far
+	 * beyond. */
 	if (surface->margin > 0 && !(options->error > 0)) {
 		m.error = 0.25 * (double)options->height;
 		m.n_kinds = N_KINDS;
@@ -228,7 +229,8 @@ int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, cons
 		struct dpoint_candidate plane, *candidate;
 
 		if (!is_open[i] || flat_patch(&plane, surface, i, options, 0, 1) == DPOINT_BAD ||
-		    (options->error > 0 && !(error_of(&view, surface, &plane, options, (double)options->error) <= (double)options->error)))
+		    (options->error > 0 &&
+		     !(error_of(&view, surface, &plane, options, (double)options->error) <= (double)options->error)))
 			continue;
 		candidate = view.is_failed ? NULL : dpoint_surface_candidate(surface);
 		if (candidate == NULL)

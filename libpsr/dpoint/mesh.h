@@ -11,8 +11,8 @@ struct dpoint_mesh_options {
 	double turn;             /* and normals turn by at most this along them, radians, but within a quarter of `cell`; 0: by
 	                          * any angle */
 	float delta;             /* the most that a rectangle may reach: 0 < delta <= 1 */
-	/* How finely looks are seen, by material: pieces whose looks differ by more than `looks` 255ths of a channel (look.h)
-	 * are cut into quarters until they are of this size; 0: not at all. NULL: as if all were 0. */
+	/* How finely looks are seen, by material: pieces whose looks differ by more than `looks` 255ths of a channel
+	 * (look.h) are cut into quarters until they are of this size; 0: not at all. NULL: as if all were 0. */
 	const double *grain_of;
 	int looks;
 	/* With an error: cells are cut further until rectangles around them can be within it. NULL, or 0: they are not. */

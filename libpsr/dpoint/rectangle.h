@@ -74,8 +74,8 @@ int fit_candidates(struct dpoint_surface *surface, const struct cell_tree *tree,
                    const struct dpoint_cover_options *options, const struct dpoint_work *work);
 
 /* Shortens delta, by classes, until the quadric over the rectangle is within options->error of the surface's facets. A
- * rectangle that then does not cover its own cell becomes that of `before` around the cell, if that is within the error.
- * MEMORY. */
+ * rectangle that then does not cover its own cell becomes that of `before` around the cell, if that is within the
+ * error. MEMORY. */
 struct bound_view;
 int shrink_within(struct dpoint_candidate *c, const struct dpoint_candidate *before, struct bound_view *view,
                   const struct looking *l);

@@ -157,7 +157,8 @@ static void place_of(float place[3], const struct dpoint_cell *cell, const float
 		place[k] = p == 8 ? middle[k] : middle[k] + INWARDS * (0.5f * (corner[k] + next[k]) - middle[k]);
 }
 
-/* Whether the lid alone stops all rays to a cell of one side: most cells have such a one among those that cover them. */
+/* Whether the lid alone stops all rays to a cell of one side: most cells have such a one among those that cover
+ * them. */
 static int stops_all(const struct sealing *s, const struct lid *lid, const struct dpoint_cell *cell,
                      const float middle[3], const float normal[3])
 {

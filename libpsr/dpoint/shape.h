@@ -18,6 +18,7 @@ int dpoint_shape_of_ring(struct dpoint_local *local, const struct dpoint_neighbo
  * 2005). local->at and a normal in local->axis[2] to begin with are given; neighbours' normals do not matter. The place
  * moves along the normal to the polynomial. *off: how far neighbours are off it, root mean square. Returns 0 as above:
  * five neighbours at least. */
-int dpoint_shape_of_cloud(struct dpoint_local *local, double *off, const struct dpoint_neighbour *neighbour, uint32_t n);
+int dpoint_shape_of_cloud(struct dpoint_local *local, double *off, const struct dpoint_neighbour *neighbour,
+                          uint32_t n);
 
 #endif

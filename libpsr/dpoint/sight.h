@@ -1,5 +1,5 @@
-/* A rectangle's frame in lanes, x, y and z or u, v and the normal at once: most of what fitting does is to look at nodes of
- * the tree of cells. Each lane is computed as rectangle.h's functions do, bit by bit. */
+/* A rectangle's frame in lanes, x, y and z or u, v and the normal at once: most of what fitting does is to look at
+ * nodes of the tree of cells. Each lane is computed as rectangle.h's functions do, bit by bit. */
 #ifndef PSR_DPOINT_SIGHT_H
 #define PSR_DPOINT_SIGHT_H
 

@@ -84,8 +84,8 @@ struct dpoint_cover_options {
 	int looks;         /* a cell may differ from the point by so many 255ths of a channel (look.h), 0..255 */
 	float error;       /* above 0: dpoint_fit() and dpoint_mend() keep the quadric over the rectangle within this distance
 	                    * of the surface's facets, as bound.h proves it, before places are packed */
-	/* Rectangles cover less than they are by this part of an extent where nothing ended it: by epsilon, or at `delta`. So
-	 * neighbours overlap, and what words tilt them by is no gap from aslant. */
+	/* Rectangles cover less than they are by this part of an extent where nothing ended it: by epsilon, or at `delta`.
+	 * So neighbours overlap, and what words tilt them by is no gap from aslant. */
 	float margin, delta;
 	float graze;       /* that slanted rays may count on (seal.h): half of what is drawn; 0: none */
 	const uint8_t *is_two_sided; /* by part: rectangles that are seen from both sides; NULL: none is */

@@ -6,9 +6,9 @@
 
 #define LEAST_GAIN 150 /* a turn that saves less than one of so many is the last */
 
-/* By cell, in the order of the tree: how many kept candidates are over it, and the sum of their indices, which tells the
- * one that is alone. By candidate: over how many cells a kept one is alone, and how many of these are `lost` to the one
- * that is looked at. */
+/* By cell, in the order of the tree: how many kept candidates are over it, and the sum of their indices, which tells
+ * the one that is alone. By candidate: over how many cells a kept one is alone, and how many of these are `lost` to the
+ * one that is looked at. */
 struct swapping {
 	const struct dpoint_cover *cover;
 	uint8_t *is_kept;

@@ -23,10 +23,11 @@ static void find_place(struct corner *c, const struct dividing *d)
 	trim_place(c->at, d->grid, c->cell, c->uv, d->options);
 }
 
-/* Finds the middle of a side. Returns how far it is from the chord, or 0 without looking where normals turn too little for
- * what is allowed: an arc of a length and a turn is off its chord by an eighth of their product, its chord is at most 4.3 %
- * shorter if it turns by 1, and normals turn by as much as the grid's cells let them. */
-static double find_middle(struct corner *middle, const struct corner *a, const struct corner *b, const struct dividing *d)
+/* Finds the middle of a side. Returns how far it is from the chord, or 0 without looking where normals turn too little
+ * for what is allowed: an arc of a length and a turn is off its chord by an eighth of their product, its chord is at
+ * most 4.3 % shorter if it turns by 1, and normals turn by as much as the grid's cells let them. */
+static double find_middle(struct corner *middle, const struct corner *a, const struct corner *b,
+                          const struct dividing *d)
 {
 	double along[3], away[3], square, t, turn = 0;
 

@@ -27,8 +27,8 @@ static void to_inner(double at[3], const struct dpoint_trimmed_options *options)
 		at[k] = (at[k] - options->origin[k]) * options->scale;
 }
 
-static int local_in(struct dpoint_local *local, const struct trim_grid *grid, const uint32_t span[2], const double uv[2],
-                    const struct dpoint_trimmed_options *options)
+static int local_in(struct dpoint_local *local, const struct trim_grid *grid, const uint32_t span[2],
+                    const double uv[2], const struct dpoint_trimmed_options *options)
 {
 	const struct dpoint_span at = { { span[0], span[1] } };
 	double in[2];
@@ -105,8 +105,8 @@ static double angle_between(const double a[3], const double b[3])
 }
 
 /* Into how many columns a part has to be divided, by what is seen at places `across`. */
-static double columns_of(const struct trim_grid *grid, int k, const struct part *part, const struct part *across, double v,
-                         const struct dpoint_trimmed_options *options)
+static double columns_of(const struct trim_grid *grid, int k, const struct part *part, const struct part *across,
+                         double v, const struct dpoint_trimmed_options *options)
 {
 	struct dpoint_local local[2];
 	int is_good[2] = { 0, 0 };
@@ -246,7 +246,8 @@ static int is_along_border(const struct trim_grid *grid, const double a[2], cons
 	return 0;
 }
 
-static int mark_rims(struct trim_grid *grid, const struct psr_patch *patch, const struct dpoint_trimmed_options *options)
+static int mark_rims(struct trim_grid *grid, const struct psr_patch *patch,
+                     const struct dpoint_trimmed_options *options)
 {
 	int rc = PSR_OK;
 
@@ -306,7 +307,8 @@ static void find_bounds(double bound[2][2], const struct psr_patch *patch)
 	}
 }
 
-static int find_rims(struct trim_grid *grid, const struct psr_patch *patch, const struct dpoint_trimmed_options *options)
+static int find_rims(struct trim_grid *grid, const struct psr_patch *patch,
+                     const struct dpoint_trimmed_options *options)
 {
 	const uint64_t n = (uint64_t)grid->axis[0].n * grid->axis[1].n;
 

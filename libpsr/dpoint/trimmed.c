@@ -142,8 +142,8 @@ static void find_rectangle(float half[2], double uv[2], const struct piece *piec
 }
 
 /* Beside a rim, candidates are along it, where any direction would do: so they reach over it least. One that may be as
- * large as all becomes long and thin where the rim is hollow, and need not cover the piece: others are little larger than
- * that. */
+ * large as all becomes long and thin where the rim is hollow, and need not cover the piece: others are little larger
+ * than that. */
 static int put_beside(struct sampling *s, const struct piece *piece, const struct dpoint_candidate *like,
                       const struct dpoint_local *middle, const double along[3])
 {

@@ -82,8 +82,8 @@ static void the_best_rectangle_has_no_bar_within(void **state)
 	}
 }
 
-/* Cells on an axis of the rectangle end it the overhang away. As narrow as that, it would be a sliver, which they cannot
- * end in its length. */
+/* Cells on an axis of the rectangle end it the overhang away. As narrow as that, it would be a sliver, which they
+ * cannot end in its length. */
 static void a_rectangle_is_no_sliver_along_its_bars(void **state)
 {
 	const float overhang = 5e-4f;

@@ -412,7 +412,8 @@ static void points_have_their_own_deltas_where_that_is_shorter(void **state)
 	dpoint_surface_fini(&surface);
 }
 
-/* A plane of 4x4 candidates, each over its own part. One of a whole half, and then another, takes the place of eight. */
+/* A plane of 4x4 candidates, each over its own part. One of a whole half, and then another, takes the place of
+ * eight. */
 static void one_candidate_takes_the_place_of_several(void **state)
 {
 	const struct dpoint_cover_options o = options(0.02, 3);

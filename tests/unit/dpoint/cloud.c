@@ -314,8 +314,8 @@ static void creases_part_polynomials(void **state)
 	drop(&s);
 }
 
-/* Noise of a tenth of the spacing, h. The polynomial of the 16 nearest, which are within 2.2 h, has normals that are off
- * by 2 / (sqrt(16) 2.2 h) of it and more; those of more points by less. */
+/* Noise of a tenth of the spacing, h. The polynomial of the 16 nearest, which are within 2.2 h, has normals that are
+ * off by 2 / (sqrt(16) 2.2 h) of it and more; those of more points by less. */
 static void noise_takes_more_points(void **state)
 {
 	const double h = 0.06, noise = 0.006;

@@ -40,8 +40,8 @@ static double reach(const struct dpoint_candidate *c, int axis)
 	return (double)c->point.at[axis] + fabs((double)(extent[0] * c->point.u[axis])) + fabs((double)(extent[1] * v[axis]));
 }
 
-/* Two squares of 2 cross at a right angle. Rectangles that reach no border, but for a cell of 1/32 and the overhang, stay
- * as they are. */
+/* Two squares of 2 cross at a right angle. Rectangles that reach no border, but for a cell of 1/32 and the overhang,
+ * stay as they are. */
 static void sheets_that_cross_end_no_rectangle(void **state)
 {
 	struct dpoint_surface surface;
@@ -120,8 +120,8 @@ static void samples_whose_rectangles_are_small_come_by_cells(void **state)
 	}
 }
 
-/* A floor of 1/8 by 1/2, and a wall of 0.1 at its end. Rectangles that are narrower than the overhang along the wall end
- * there, but for the overhang, as wide ones do. A place is a float below 1. */
+/* A floor of 1/8 by 1/2, and a wall of 0.1 at its end. Rectangles that are narrower than the overhang along the wall
+ * end there, but for the overhang, as wide ones do. A place is a float below 1. */
 static void a_rectangle_narrower_than_the_overhang_ends_along_its_length(void **state)
 {
 	struct dpoint_surface surface;

@@ -185,8 +185,8 @@ static int is_beside_cut_out(void *userdata, uint32_t triangle, double u, double
 	return !(fabs(at[0]) < CUT_OUT && fabs(at[1]) < CUT_OUT);
 }
 
-/* A piece is there if its middle is, so what is there ends within a piece, 1.5 grains; rectangles reach over that as over a
- * border, and those that mend by a cell, which is no larger. */
+/* A piece is there if its middle is, so what is there ends within a piece, 1.5 grains; rectangles reach over that as
+ * over a border, and those that mend by a cell, which is no larger. */
 static void no_extent_crosses_what_is_cut_out(void **state)
 {
 	const struct dpoint_cover_options options = {
@@ -360,8 +360,8 @@ static double area_of(const struct dpoint_cell *cell)
 	return v3d_length(sum);
 }
 
-/* A triangle of sides 1 and 1/100 is cut along the long ones alone, into 101 parts: the longest is a little over 1. One of
- * 1 and 0.035 has four rows of 104, 78, 52 and 26. Areas are the triangle's; places are floats of at most 1. */
+/* A triangle of sides 1 and 1/100 is cut along the long ones alone, into 101 parts: the longest is a little over 1. One
+ * of 1 and 0.035 has four rows of 104, 78, 52 and 26. Areas are the triangle's; places are floats of at most 1. */
 static void narrow_triangles_have_pieces_that_are_not(void **state)
 {
 	static const struct narrow {
@@ -400,8 +400,8 @@ static void narrow_triangles_have_pieces_that_are_not(void **state)
 }
 
 /* A torus whose tube has a radius of 0.4: normals turn by 0.1 along 0.04 of it, and along 0.14 of its outside, which is
- * 1.4 away from the axis. Cells of 0.2 are cut until their sides are no longer, or to a quarter: 0.05, whose diagonal is
- * 1.42 times as long. */
+ * 1.4 away from the axis. Cells of 0.2 are cut until their sides are no longer, or to a quarter: 0.05, whose diagonal
+ * is 1.42 times as long. */
 static void pieces_are_cut_where_normals_turn(void **state)
 {
 	const double most = 0.1;

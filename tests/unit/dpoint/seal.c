@@ -59,8 +59,8 @@ static void make_rough(struct rough *m, double height)
 }
 
 /* Whether a ray through the origin towards w meets z = (a x^2 + b y^2) / 2, moved by p, within the extents, with its
- * normal towards w, or either way if it has two sides, and no further than `behind` behind the origin. By steps of a Newton iteration from both ends of what
- * may count, in doubles. */
+ * normal towards w, or either way if it has two sides, and no further than `behind` behind the origin. By steps of a
+ * Newton iteration from both ends of what may count, in doubles. */
 static int is_stopped(const double p[3], const double w[3], const double l[2], const double extent[2], double behind,
                       int is_two_sided)
 {
@@ -72,7 +72,8 @@ static int is_stopped(const double p[3], const double w[3], const double l[2], c
 			const double off = p[2] + t * w[2] - 0.5 * (l[0] * x * x + l[1] * y * y);
 			const double slope = w[2] - l[0] * x * w[0] - l[1] * y * w[1];
 
-			if (fabs(off) < 1e-12 && (slope > 0 || is_two_sided) && t >= -behind && fabs(x) <= extent[0] && fabs(y) <= extent[1])
+			if (fabs(off) < 1e-12 && (slope > 0 || is_two_sided) && t >= -behind && fabs(x) <= extent[0] &&
+			    fabs(y) <= extent[1])
 				return 1;
 			t -= off / (fabs(slope) > 1e-9 ? slope : 1e-9);
 		}
@@ -116,8 +117,8 @@ static int gets_through(const struct dpoint_surface *surface, const struct dpoin
 	return 1;
 }
 
-/* Rays to the middles of cells and near their corners, of 0, 49 and 69.5 degrees to their planes' normals; from behind of
- * 83 as well, which get two and a half times as far. */
+/* Rays to the middles of cells and near their corners, of 0, 49 and 69.5 degrees to their planes' normals; from behind
+ * of 83 as well, which get two and a half times as far. */
 static size_t count_through(const struct dpoint_surface *surface, const struct dpoint_choice *choice,
                             const struct dpoint_cover_options *o, int is_behind)
 {

@@ -78,7 +78,8 @@ static void estimate(struct errors *e, const struct dpoint_patch *patch, double 
 	across = v3f_dot(a.u, b.u);
 	e->curvature += pow(a.lambda_u - b.lambda_u, 2) + pow(a.lambda_u * a.rho - b.lambda_u * b.rho, 2);
 	e->n += 2;
-	/* Near an umbilic point a direction is any; the error of one is that of the shape over the curvatures' difference. */
+	/* Near an umbilic point a direction is any; the error of one is that of the shape over the curvatures'
+	 * difference. */
 	if (fabs(a.rho - 1) > 0.2) {
 		e->direction += pow(acos(fmin(1, fabs(across))), 2);
 		e->n_directed++;
@@ -113,7 +114,8 @@ static void errors_fall_with_the_distance_of_neighbours(void **state)
 				assert_true(e[level].curvature <= e[level - 1].curvature / pow(2, 0.8) + 1e-5);
 				assert_true(e[level].direction <= e[level - 1].direction / pow(2, 0.8) + 1e-3);
 			}
-			/* At 1/80 of the model errors are below the steps of a word: 5.9 % of curvatures of 1 and more, pi / 256. */
+			/* At 1/80 of the model errors are below the steps of a word: 5.9 % of curvatures of 1 and more, pi /
+			 * 256. */
 			assert_true(e[3].curvature < 0.059 && e[3].direction < 3.1416 / 256);
 		}
 	}

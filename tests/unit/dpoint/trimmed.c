@@ -114,8 +114,8 @@ static double area_of(const struct dpoint_surface *surface)
 	return area;
 }
 
-/* Chords of arcs of TURN are shorter by TURN^2 / 24 at most, along and across, and their middles are TURN^2 / 8 of a radius
- * further in. Rims of one side around the whole surface have no hem. */
+/* Chords of arcs of TURN are shorter by TURN^2 / 24 at most, along and across, and their middles are TURN^2 / 8 of a
+ * radius further in. Rims of one side around the whole surface have no hem. */
 static void check_area(const struct dpoint_surface *surface, double area, double rims)
 {
 	const double found = area_of(surface) - rims * HEM;

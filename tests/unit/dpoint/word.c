@@ -192,8 +192,8 @@ static void any_word_unpacks_to_a_point(void **state)
 }
 
 /* Seen along u alone, a side reaches as far as makes a strip as wide as the sixteenth times the sight's sine, up to 82
- * degrees. Whatever way a sight goes, w of length 1, what it sees of the reach is shorter than 3 sixteenths: with
- * x = h min(|wu / wn|, 1.5 (1 + |wu / wv|)), x sqrt(wv^2 + wn^2) <= x |wv| + x |wn| <= 1.5 h (|wv| + |wu|) + h |wu|, and
+ * degrees. Whatever way a sight goes, w of length 1, what it sees of the reach is shorter than 3 sixteenths: with x = h
+ * min(|wu / wn|, 1.5 (1 + |wu / wv|)), x sqrt(wv^2 + wn^2) <= x |wv| + x |wn| <= 1.5 h (|wv| + |wu|) + h |wu|, and
  * 1.5^2 + 2.5^2 < 3^2. */
 static void what_grazes_reaches_over_sides_by_little(void **state)
 {
