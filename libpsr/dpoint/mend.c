@@ -81,7 +81,7 @@ struct mending {
 	const struct tally *tally;
 	uint32_t *own;           /* the candidate of each cell, or UINT32_MAX; NULL: patches are flat */
 	double error;            /* that patches should be within; 0: the first kind will do */
-	enum kind n_kinds;       /* those before it are tried */
+	enum kind first, n_kinds; /* those from the first on and before n_kinds are tried */
 	struct bound_view view;
 };
 
@@ -112,7 +112,7 @@ static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mendi
 	double least = INFINITY;
 
 	*is_bad = 1;
-	for (enum kind kind = BENT; kind < m->n_kinds && least > m->error && !m->view.is_failed; kind++) {
+	for (enum kind kind = m->first; kind < m->n_kinds && least > m->error && !m->view.is_failed; kind++) {
 		double error;
 
 		if (!patch_of(&patch, m, at, kind))
@@ -203,10 +203,11 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 	rc = tally_init(&tally, cover);
 	if (rc == PSR_OK)
 		tally_add_all(&tally);
-	/* Rims cut cells of patches to slanted pieces: a rectangle along the longest side of such a one may go far
-	 * beyond. */
-	if (surface->margin > 0 && !(options->error > 0)) {
+	/* Rims cut cells of patches to slanted pieces, and triangles of meshes are such: a rectangle along the longest side
+	 * of one that ends at an edge goes beyond it, by half a sample and more. */
+	if (surface->facets.n > 0 && !surface->is_cloud && !(options->error > 0)) {
 		m.error = 0.25 * (double)options->height;
+		m.first = surface->margin > 0 ? BENT : FLAT;
 		m.n_kinds = N_KINDS;
 	}
 	if (rc == PSR_OK && (m.error > 0 || surface->is_cloud))
