@@ -95,6 +95,7 @@ int fill_begin(struct fill *fill, const struct simd *simd, const struct plan *pl
 	fill->simd = simd;
 	fill->plan = plan;
 	fill->picture = *picture;
+	fill->looks = plan->with_splats || picture->stack->levels >> FILL_CLOSE == 0;
 	fill->deepest = 0;
 	fill->n_changed = fill->n_filled = fill->n_far = 0;
 	fill->reach = 0;
@@ -156,7 +157,8 @@ void fill_look(struct fill *fill, uint32_t row)
 			continue;
 		}
 		end = run_end(fill, fill->picture.bricks, bx, row, 0);
-		fill_note_own(fill, bx, end, row);
+		if (fill->looks)
+			fill_note_own(fill, bx, end, row);
 		while (fill_pull_weights(fill, bx, end, row, level) < WEIGHT_ONE && level < fill->brick_top)
 			level++;
 		memset(pulled + bx, level, end - bx);

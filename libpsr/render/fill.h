@@ -8,10 +8,13 @@
 #define FILL_LEVELS 15      /* 2^14 is the largest side */
 #define FILL_BRICK_LEVELS 5 /* where a brick is one cell */
 
-/* For a pixel that gets its depth from cells, samples are looked for that it or pixels around it show: in the smallest
+/* For a pixel that gets its depth from cells, samples are looked for that it or pixels around it show, in pictures whose
+ * samples are close: cells of FILL_CLOSE and coarser levels are not in use, or discs cover what is between samples. In
+ * others most pixels have no sample near, and count the reach of cells. They are looked for in the smallest
  * square with one that is FILL_APART pixels away at most along the view axis, and one pixel more to all sides; at most
  * FILL_NEAR to each. But if the smallest square with any, and one pixel more, has FILL_MANY and none so near along the
  * axis, it is among pixels of another surface, and gets the depth of the one that is nearest along the axis. */
+#define FILL_CLOSE 2
 #define FILL_NEAR 8
 #define FILL_APART 2 /* pixels */
 #define FILL_MANY 6
@@ -48,6 +51,7 @@ struct fill {
 	float *own;       /* z' of samples that marked bricks' pixels show: those of any weight; NAN of others and around */
 	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
 	size_t coarse_first[FILL_LEVELS], n_coarse;
+	int looks;        /* for samples around pixels */
 	int is_coarse;    /* a brick needs levels beyond brick_top */
 	int needed;       /* the greatest of `needs` */
 	int pushed;       /* the level that is being pushed; 0: the picture */

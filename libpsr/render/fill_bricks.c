@@ -83,7 +83,7 @@ uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32
 	const struct fill_level *to = &fill->level[level], *from = to - 1;
 	const struct cells c = cells_of(fill, bx0, bx1, by, level);
 	const float scale = fill_scale(fill->plan, level), offset = fill_offset(fill->plan, level);
-	const int is_own = fill->picture.bricks[by * fill->bricks_x + bx0];
+	const int is_own = fill->looks && fill->picture.bricks[by * fill->bricks_x + bx0];
 	struct picture_row rows[2];
 	uint16_t least = WEIGHT_ONE;
 

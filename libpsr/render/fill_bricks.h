@@ -68,8 +68,8 @@ void fill_pull_colors(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
  * and below. */
 void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early);
 
-/* Pixels. far: their depth changed, and no pixel within FILL_NEAR shows a sample; reach: the greatest distance of any
- * other such one to the nearest sample, in pixels of its depth. */
+/* Pixels. far: their depth changed, and no sample was found within FILL_NEAR, or none is looked for, when any number
+ * stands for all; reach: the greatest distance of any other such one to the nearest sample, in pixels of its depth. */
 struct fill_counts {
 	uint32_t n_changed, n_filled, n_far;
 	float reach;

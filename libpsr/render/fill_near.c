@@ -183,6 +183,11 @@ void fill_note_depths(struct fill_counts *counts, const struct fill *fill, uint3
 	uint16_t place[FILL_PIECE], far[FILL_PIECE];
 	uint32_t n_far;
 
+	if (!fill->looks) {
+		for (uint32_t i = 0; i < n && counts->n_far == 0; i++)
+			counts->n_far = places->weight[i] < WEIGHT_ONE / 2 && places->z[i] < INFINITY;
+		return;
+	}
 	memset(z, 0xff, end * sizeof *z); /* no numbers */
 	for (uint32_t i = 0; i < n; i++) {
 		z[places->at[i]] = places->weight[i] < WEIGHT_ONE / 2 ? places->z[i] : INFINITY;

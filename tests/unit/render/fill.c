@@ -308,6 +308,7 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 	uint64_t n_changed = 0, n_filled = 0, n_far = 0;
 	double reach = 0;
 
+	p.stack.levels = draw(3) ? 2 : 6; /* a third has cells of level 2, too */
 	p.fill.stack = &p.stack;
 	uint16_t *weights = malloc(p.area * sizeof *weights); /* as they are before the fill makes pixels whole */
 	assert_non_null(weights);
@@ -336,6 +337,11 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 		n_filled += weights[i] == 0 && c->z < INFINITY;
 		if (weights[i] >= WEIGHT_ONE / 2 || c->z == INFINITY) {
 			assert_true(p.fill.depth[i] == (weights[i] < WEIGHT_ONE / 2 ? INFINITY : -1));
+			continue;
+		}
+		if (p.stack.levels >> FILL_CLOSE) {
+			assert_true(ldexpf(p.fill.depth[i], -p.stack.exponent) == c->z);
+			n_far++;
 			continue;
 		}
 		const struct beside beside =
