@@ -15,7 +15,7 @@ _Static_assert(sizeof(struct psr_calibrated_fine) == 8 && offsetof(struct psr_ca
 #define ALIKE_LAYERS 0.5  /* natural logarithm of the number of layers, */
 #define UNLIKE_LIGHT 0.2  /* and what a view counts with shadows in place of none */
 #define LEAST_ALIKE 1e-3
-#define UPPER 0.95 /* of views that were measured, some ten of them like a view: so nine of ten others keep it */
+#define UPPER 0.98 /* of views that were measured, some ten of them like a view: so nine of ten others keep it */
 
 const struct psr_rung psr_ladder[PSR_RUNGS] = {
 	{ .scale = 4, .spacing_px = 1 },
