@@ -84,6 +84,15 @@ static const columns_if column_x = { -3, -2, -1, 0, 1, 2, 3, 4 };
 #define NONE       (INFINITY - (columns){ 0 })
 #define PICK(if_, a, b) ((columns)(((columns_if)(if_) & (columns_if)(a)) | (~(columns_if)(if_) & (columns_if)(b))))
 #define LEAST(a, b) PICK((a) < (b), a, b)
+#define FOLD(distance2, along, n, ...)                                                    \
+	do {                                                                                  \
+		const columns other2 = __builtin_shufflevector(distance2, distance2, __VA_ARGS__); \
+		const columns other_along = __builtin_shufflevector(along, along, __VA_ARGS__);    \
+                                                                                          \
+		distance2 = LEAST(other2, distance2);                                             \
+		along = LEAST(other_along, along);                                                \
+		n += __builtin_shufflevector(n, n, __VA_ARGS__);                                  \
+	} while (0)
 #define ALONG(from, apart) ((columns)((columns_if)((apart) * (from)->steep) & INT32_MAX))
 
 static inline void row_at(columns *row, const float *own)
@@ -112,14 +121,9 @@ static struct fill_beside fill_beside(const struct fill_from *from, const float 
 		along = LEAST(some, along);
 		n += is_some;
 	}
-	for (int half = COLUMNS / 2; half > 0; half /= 2) {
-		const columns_if other = (columns_if){ 0, 1, 2, 3, 4, 5, 6, 7 } ^ half;
-		const columns other2 = __builtin_shuffle(distance2, other), other_along = __builtin_shuffle(along, other);
-
-		distance2 = LEAST(other2, distance2);
-		along = LEAST(other_along, along);
-		n += __builtin_shuffle(n, other);
-	}
+	FOLD(distance2, along, n, 4, 5, 6, 7, 0, 1, 2, 3);
+	FOLD(distance2, along, n, 2, 3, 0, 1, 6, 7, 4, 5);
+	FOLD(distance2, along, n, 1, 0, 3, 2, 5, 4, 7, 6);
 	return (struct fill_beside){ (uint32_t)-n[0], distance2[0], along[0] };
 }
 
@@ -149,6 +153,7 @@ static struct fill_place fill_pick(const struct fill_from *from, const float *ow
 #undef NONE
 #undef PICK
 #undef LEAST
+#undef FOLD
 #undef ALONG
 #undef SIDE
 #undef COLUMNS

@@ -58,16 +58,14 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack, 
 static inline void repeat(float *to, const float *from, uint32_t n)
 {
 	typedef float run __attribute__((vector_size(4 * SPREAD_RUN)));
-	typedef int32_t places __attribute__((vector_size(4 * SPREAD_RUN)));
-	const places left = { 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7 };
 
 	for (uint32_t first = 0; first < n; first += SPREAD_RUN) {
 		run values, twice;
 
 		memcpy(&values, from + first, sizeof values);
-		twice = __builtin_shuffle(values, left);
+		twice = __builtin_shufflevector(values, values, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7);
 		memcpy(to + 2 * first, &twice, sizeof twice);
-		twice = __builtin_shuffle(values, left + SPREAD_RUN / 2);
+		twice = __builtin_shufflevector(values, values, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13, 14, 14, 15, 15);
 		memcpy(to + 2 * first + SPREAD_RUN, &twice, sizeof twice);
 	}
 }
