@@ -306,6 +306,25 @@ static void an_entity_that_is_missing_ends_nothing_else(void **state)
 	free(rest);
 }
 
+static void a_coordinate_beyond_all_numbers_is_told(void **state)
+{
+	uint8_t *bytes = NULL;
+	char *at;
+	size_t n = 0;
+
+	(void)state;
+	if (!has_module)
+		skip();
+	assert_int_equal(infile_read(&bytes, &n, "tests/data/import/pins.step", 1 << 20, NULL), PSR_OK);
+	bytes[n - 1] = 0;
+	at = strstr((char *)bytes, "CARTESIAN_POINT('',(10.,-2.449293598295E-15,");
+	assert_non_null(at);
+	memcpy(strstr(at, "E-15"), "E999", 4);
+	write_bytes(path_of("far.step"), bytes, n - 1);
+	refuse("far.step", PSR_ERR_FORMAT, "has a coordinate that is not finite");
+	free(bytes);
+}
+
 /* Text with the frame of a file, whose entities are none, is Open CASCADE's to refuse. */
 static void other_contents_are_told(void **state)
 {
@@ -352,6 +371,7 @@ int main(void)
 		cmocka_unit_test(threads_change_nothing),
 		cmocka_unit_test(a_file_that_ends_in_the_middle_is_told),
 		cmocka_unit_test(an_entity_that_is_missing_ends_nothing_else),
+		cmocka_unit_test(a_coordinate_beyond_all_numbers_is_told),
 		cmocka_unit_test(other_contents_are_told),
 	};
 
