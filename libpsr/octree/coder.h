@@ -121,4 +121,20 @@ static inline __attribute__((always_inline)) unsigned coder_adaptive(struct code
 	return bit;
 }
 
+/* What a probability of 22 bits above a count of 10 becomes after a bit: what it was wrong by goes into it by
+ * part[count] / 2^14, and the count goes up by `more`. Modulo 2^32. */
+#define CODER_COUNTED_EVEN (UINT32_C(1) << 31)
+static inline uint32_t coder_count(uint32_t was)
+{
+	return was & 1023;
+}
+
+static inline __attribute__((always_inline)) uint32_t coder_learn(uint32_t was, const uint32_t *part, uint32_t more,
+                                                                  unsigned bit)
+{
+	const int32_t wrong = (int32_t)(bit << 22) - (int32_t)(was >> 10);
+
+	return was + (((uint32_t)(wrong >> 4) * part[coder_count(was)]) & ~1023u) + more;
+}
+
 #endif

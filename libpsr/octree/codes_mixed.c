@@ -45,13 +45,10 @@ ALWAYS unsigned gather_far(uint64_t x)
 
 /* ---- a bit ---- */
 
-/* What a probability was wrong by goes into it by 1 / (count + 2), and the count goes up. Modulo 2^32. */
+/* By 1 / (count + 2). */
 ALWAYS uint32_t learn(const struct codes_model *model, uint32_t was, unsigned bit)
 {
-	const uint32_t count = was & 1023;
-	const int32_t wrong = (int32_t)(bit << 22) - (int32_t)(was >> 10);
-
-	return was + (((uint32_t)(wrong >> 4) * model->part[count]) & ~1023u) + model->more[count];
+	return coder_learn(was, model->part, model->more[coder_count(was)], bit);
 }
 
 ALWAYS int32_t held(int32_t x)

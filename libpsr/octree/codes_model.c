@@ -51,7 +51,7 @@ static void make_places(struct codes_model *model)
 static void fill(uint32_t *p, size_t n)
 {
 	for (size_t i = 0; i < n; i++)
-		p[i] = (uint32_t)1 << 31;
+		p[i] = CODER_COUNTED_EVEN;
 }
 
 void *codes_mixed_model(void)
