@@ -1,16 +1,15 @@
 #include "radix.h"
 
 #include <string.h>
+#include "maths.h"
 
 #define BITS 11
 #define DIGITS (1u << BITS)
 
 uint32_t radix_of_float(float x)
 {
-	const float positive_zero = x + 0.0f;
-	uint32_t bits;
+	const uint32_t bits = psr_bits_from_float(x + 0.0f); /* of both zeros the positive one */
 
-	memcpy(&bits, &positive_zero, sizeof bits);
 	return bits ^ (bits >> 31 ? UINT32_MAX : UINT32_C(1) << 31);
 }
 

@@ -33,6 +33,11 @@ struct beside {
 	int is_among;    /* many show another surface */
 };
 
+static int is_marked(const struct fill *fill, uint32_t x, uint32_t y)
+{
+	return fill->picture.bricks[y / BRICK * fill->bricks_x + x / BRICK];
+}
+
 /* The depth of the sample that a pixel shows: NAN or INFINITY without any. */
 static float own_depth(const struct fill *fill, int32_t column, int32_t row)
 {
@@ -41,7 +46,7 @@ static float own_depth(const struct fill *fill, int32_t column, int32_t row)
 
 	if (column < 0 || row < 0 || x >= fill->width || y >= fill->height)
 		return NAN;
-	if (fill->picture.bricks[y / BRICK * fill->bricks_x + x / BRICK])
+	if (is_marked(fill, x, y))
 		return fill_own_row(fill, y)[x];
 	word = psr_zstack_row(fill->picture.stack, y)[x];
 	return word == PSR_WORD_EMPTY ? NAN : psr_float_from_bits((uint32_t)(word >> 32));
@@ -93,13 +98,11 @@ static struct beside look_beside(const struct fill *fill, const struct fill_from
 /* Whether the pixels of a square are of marked bricks, so that `own` has them all. */
 static int has_square(const struct fill *fill, uint32_t x, uint32_t y, uint32_t reach)
 {
-	const uint8_t *const upper = fill->picture.bricks + (y - reach) / BRICK * fill->bricks_x;
-	const uint8_t *const lower = fill->picture.bricks + (y + reach) / BRICK * fill->bricks_x;
-	const uint32_t left = (x - reach) / BRICK, right = (x + reach) / BRICK;
-
-	return x >= reach && y >= reach && x + reach < fill->width && y + reach < fill->height && upper[left]
-	       && upper[right] && lower[left] && lower[right];
+	return x >= reach && y >= reach && x + reach < fill->width && y + reach < fill->height
+	       && is_marked(fill, x - reach, y - reach) && is_marked(fill, x + reach, y - reach)
+	       && is_marked(fill, x - reach, y + reach) && is_marked(fill, x + reach, y + reach);
 }
+_Static_assert(2 * FILL_SQUARE < BRICK, "the bricks of its corners are all");
 
 /* As look_beside(), if a square of FILL_SQUARE pixels to each side tells; returns whether. */
 static int look_near(struct beside *beside, const struct fill *fill, const struct fill_from *from, uint32_t x,
@@ -107,7 +110,8 @@ static int look_near(struct beside *beside, const struct fill *fill, const struc
 {
 	const float *const own = fill_own_row(fill, y) + x;
 	const ptrdiff_t stride = (ptrdiff_t)fill->width + 2;
-	int first = *own < INFINITY ? 0 : FILL_NEAR, last = fabsf(*own - from->z) * from->steep <= FILL_APART ? 1 : FILL_NEAR;
+	int first = *own < INFINITY ? 0 : FILL_NEAR;
+	int last = fabsf(*own - from->z) * from->steep <= FILL_APART ? 1 : FILL_NEAR;
 	struct fill_beside square;
 
 	for (int reach = 1; reach <= FILL_SQUARE && has_square(fill, x, y, (uint32_t)reach); reach++) {
