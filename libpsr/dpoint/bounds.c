@@ -7,7 +7,6 @@
 #define CHUNK 256     /* candidates */
 #define LEAST 1e-5
 #define STEPS 4       /* of halving a factor of two */
-#define SAMPLE 8      /* of so many chunks the first is measured before all */
 /* Of the worst distance that is known: points that bound_holds() is 1 for at so much come out below it. Its 0 is wrong
  * by 3 % at most, and halving ends 1/16 above a 0: 1.03 * 1.0625 = 1.095 times as far as the point is at most. */
 #define SAFE (1 / 1.15)
@@ -17,10 +16,9 @@ struct measuring {
 	const struct dpoint_choice *choice;
 	const struct dpoint_cover_options *options;
 	struct dpoint_bounds *of_chunk;
-	double worst;  /* some chunk's: what is certainly below it is not measured */
+	double worst;  /* of the chunks that are measured so far: what is certainly below it is not measured. Which these are
+	                * depends on threads, the result does not: the worst chunk is never below another one. */
 	int n_chunks;
-	int stride;    /* this turn measures each stride-th chunk from the last on, where points that mend are, which may be
-	                * far off; 0: the others */
 	int is_failed;
 };
 
@@ -50,14 +48,32 @@ static void look(struct dpoint_bounds *bounds, struct bound_view *view, const st
 	bounds->worst = asked > 0 && !is_over ? fmax(before, fmin(high, asked)) : high;
 }
 
+static double worst_of(const struct measuring *m)
+{
+	double worst;
+
+	__atomic_load(&m->worst, &worst, __ATOMIC_RELAXED);
+	return worst;
+}
+
+static void raise_worst(struct measuring *m, double to)
+{
+	double worst = worst_of(m);
+
+	while (to > worst &&
+	       !__atomic_compare_exchange(&m->worst, &worst, &to, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+		;
+}
+
 /* What a point is off decides nothing where it is less than another one. */
 static int is_less(struct bound_view *view, const struct measuring *m, const struct dpoint_candidate *c)
 {
+	const double certain = SAFE * worst_of(m);
 	float extent[2];
 
 	dpoint_candidate_extent(extent, c, m->options->sine);
-	return bound_look(view, &m->surface->facets, &c->point, extent, SAFE * m->worst) == PSR_OK &&
-	       bound_likely_holds(view, extent, SAFE * m->worst);
+	return bound_look(view, &m->surface->facets, &c->point, extent, certain) == PSR_OK &&
+	       bound_likely_holds(view, extent, certain);
 }
 
 static int is_chunk_less(struct bound_view *view, const struct measuring *m, size_t begin, size_t end)
@@ -70,20 +86,22 @@ static int is_chunk_less(struct bound_view *view, const struct measuring *m, siz
 	return 1;
 }
 
+/* From the last on, where points that mend are, which may be far off. */
 static void measure_chunk(int i, void *userdata)
 {
 	struct measuring *m = userdata;
-	const int chunk = m->n_chunks - 1 - (m->stride > 0 ? i * m->stride : i + i / (SAMPLE - 1) + 1);
+	const int chunk = m->n_chunks - 1 - i;
 	struct dpoint_bounds *bounds = &m->of_chunk[chunk];
 	struct bound_view view = { .seen = NULL };
 	const size_t begin = (size_t)chunk * CHUNK, n = m->surface->n_candidates;
 	const size_t end = begin + CHUNK < n ? begin + CHUNK : n;
 
 	*bounds = (struct dpoint_bounds){ 0, LEAST };
-	if (m->stride > 0 || !is_chunk_less(&view, m, begin, end))
+	if (!is_chunk_less(&view, m, begin, end))
 		for (size_t c = begin; c < end && !view.is_failed; c++)
 			if (m->choice->is_kept[c])
 				look(bounds, &view, m, &m->surface->candidate[c]);
+	raise_worst(m, bounds->worst);
 	if (view.is_failed)
 		__atomic_store_n(&m->is_failed, 1, __ATOMIC_RELAXED);
 	bound_view_fini(&view);
@@ -93,9 +111,9 @@ int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surf
                           const struct dpoint_choice *choice, const struct dpoint_cover_options *options,
                           struct psr_pool *pool)
 {
-	const int n_chunks = (int)((surface->n_candidates + CHUNK - 1) / CHUNK), n_first = (n_chunks + SAMPLE - 1) / SAMPLE;
-	struct measuring m = { .surface = surface, .choice = choice, .options = options, .n_chunks = n_chunks,
-	                       .stride = SAMPLE };
+	const int n_chunks = (int)((surface->n_candidates + CHUNK - 1) / CHUNK);
+	struct measuring m = { .surface = surface, .choice = choice, .options = options, .worst = LEAST,
+		                   .n_chunks = n_chunks };
 
 	*bounds = (struct dpoint_bounds){ 0, 0 };
 	if (surface->facets.n == 0)
@@ -103,11 +121,7 @@ int dpoint_bounds_measure(struct dpoint_bounds *bounds, const struct dpoint_surf
 	m.of_chunk = calloc((size_t)n_chunks + 1, sizeof *m.of_chunk);
 	if (m.of_chunk == NULL)
 		return PSR_ERR_MEMORY;
-	psr_pool_for(pool, n_first, measure_chunk, &m);
-	for (int i = 0; i < n_chunks; i++)
-		m.worst = fmax(m.worst, m.of_chunk[i].worst);
-	m.stride = 0;
-	psr_pool_for(pool, n_chunks - n_first, measure_chunk, &m);
+	psr_pool_for(pool, n_chunks, measure_chunk, &m);
 	for (int i = 0; i < n_chunks; i++) {
 		bounds->n_over += m.of_chunk[i].n_over;
 		bounds->worst = fmax(bounds->worst, m.of_chunk[i].worst);
