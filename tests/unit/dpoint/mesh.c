@@ -343,6 +343,35 @@ static void mending_leaves_no_hole(void **state)
 	free(m);
 }
 
+/* Of a cell whose surface leans by 30 degrees from its plane, that is within the facets: a point in the plane stays on
+ * them, one that leans as the surface is a fortieth off at the ends. */
+static void mending_stays_nearest(void **state)
+{
+	static const float corner[4][3] = { { 0, 0, 0 }, { 0.1f, 0, 0 }, { 0.1f, 0.1f, 0 }, { 0, 0.1f, 0 } };
+	static const float facet[3][3] = { { -1, -1, 0 }, { 3, -1, 0 }, { -1, 3, 0 } };
+	const struct dpoint_cover_options options = { .sine = 0.02f, .slack = 1e-5f, .angle = 0.05f, .height = 0.001f };
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_cell *cell;
+
+	(void)state;
+	dpoint_surface_init(&surface);
+	cell = dpoint_surface_cell(&surface);
+	assert_non_null(cell);
+	memset(cell, 0, sizeof *cell);
+	memcpy(cell->corner, corner, sizeof corner);
+	cell->normal[0] = 0.5f;
+	cell->normal[2] = 0.8660254f;
+	assert_int_equal(facets_add(&surface.facets, facet[0], facet[1], facet[2]), PSR_OK);
+	assert_int_equal(facets_sort(&surface.facets), PSR_OK);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(surface.n_candidates, 1);
+	assert_true(surface.candidate[0].point.normal[2] > 0.99f);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+}
+
 static double area_of(const struct dpoint_cell *cell)
 {
 	double sum[3] = { 0, 0, 0 };
@@ -488,6 +517,7 @@ int main(void)
 		cmocka_unit_test(under_a_fitted_rectangle_normals_are_within_the_angle),
 		cmocka_unit_test(two_turns_cover_all_with_little_more),
 		cmocka_unit_test(mending_leaves_no_hole),
+		cmocka_unit_test(mending_stays_nearest),
 		cmocka_unit_test(narrow_triangles_have_pieces_that_are_not),
 		cmocka_unit_test(pieces_are_cut_where_normals_turn),
 		cmocka_unit_test(too_many_pieces_are_refused),
