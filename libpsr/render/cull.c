@@ -29,34 +29,60 @@ static enum bin_kind kind_of(const struct plan *plan, const struct psr_blocks *b
 	return traits & PSR_BLOCK_THIN ? BIN_THIN : BIN_GLASS;
 }
 
+/* Lists the blocks of a batch that are left. Without branches here and below: whether a block is left is hard to
+ * predict. */
+static uint32_t list_left(uint8_t left[CULL_BATCH], const struct cull_batch *batch, uint32_t n)
+{
+	uint32_t n_left = 0;
+
+	for (uint32_t i = 0; i < n; i++) {
+		left[n_left] = (uint8_t)i;
+		n_left += (uint32_t)batch->is_left[i];
+	}
+	return n_left;
+}
+
+/* Keeps those that masks do not hide; blocks count from `first`. */
+static uint32_t drop_masked(uint8_t left[CULL_BATCH], uint32_t n, const struct cull_batch *batch,
+                            const struct cull_masks *masks, const struct psr_blocks *b, uint32_t first)
+{
+	uint32_t n_left = 0;
+
+	for (uint32_t k = 0; k < n; k++) {
+		const uint32_t i = left[k];
+
+		left[n_left] = (uint8_t)i;
+		n_left += !cull_by_mask(masks, b, first + i, (uint32_t)batch->range[i]);
+	}
+	return n_left;
+}
+
 /* Takes the results of a batch, blocks first .. first + n - 1. */
 static void take_batch(struct cull_counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
 {
-	struct cull_chunk *chunk = to->chunk;
+	struct cull_chunk chunk = *to->chunk; /* in registers: stores into hits might change *to->chunk */
 	struct cull_hit *hit = to->hit;
 	const struct plan *plan = to->plan;
-	const struct plan_instance *in = &plan->instance[chunk->instance];
-	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->bins->masks[chunk->instance] : NULL;
+	const struct plan_instance *in = &plan->instance[chunk.instance];
+	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->bins->masks[chunk.instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const int is_ewa = plan->with_ewa && in->cull.cubes != NULL; /* splats close gaps themselves */
 	const int32_t most_x = (int32_t)plan->width - 1, most_y = (int32_t)plan->height - 1;
 
-	for (uint32_t i = 0; i < n; i++) {
-		const uint32_t block = first + i;
+	uint8_t left[CULL_BATCH];
+	const uint32_t n_seen = list_left(left, batch, n);
+	const uint32_t n_left = masks != NULL ? drop_masked(left, n_seen, batch, masks, b, first) : n_seen;
 
-		if (!batch->is_left[i])
-			continue;
+	chunk.n_masked += n_seen - n_left;
+	for (uint32_t k = 0; k < n_left; k++) {
+		const uint32_t i = left[k], block = first + i;
 		const unsigned traits = psr_blocks_traits(b, block);
-		if (masks != NULL && cull_by_mask(masks, b, block, (uint32_t)batch->range[i])) {
-			chunk->n_masked++;
-			continue;
-		}
 		const int is_clamped = !is_ewa && batch->level[i] > PSR_MAX_DEPTH_LEVEL;
 		const int level = is_clamped ? PSR_MAX_DEPTH_LEVEL : is_ewa ? 0 : batch->level[i];
 		const int at_border = (batch->x0[i] == 0) | (batch->y0[i] == 0) | (batch->x1[i] == most_x)
 		                      | (batch->y1[i] == most_y);
 		*hit = (struct cull_hit){
-			.slot = in->first_slot + block, .instance = (uint16_t)chunk->instance, .near = batch->near[i],
+			.slot = in->first_slot + block, .instance = (uint16_t)chunk.instance, .near = batch->near[i],
 			.level = (uint8_t)level, .is_mixed = batch->is_mixed[i] & 1, .at_border = at_border & 1,
 			.is_wide = in->cull.cubes != NULL && (level > 0 || plan->with_splats || is_ewa),
 			.kind = kind_of(plan, b, block, traits) & 3,
@@ -66,17 +92,18 @@ static void take_batch(struct cull_counting *to, const struct cull_batch *batch,
 			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
 		};
 		cull_count_tiles(to, hit);
-		chunk->levels |= 1u << hit->level;
-		chunk->n_mixed += hit->is_mixed;
-		chunk->n_clamped += (uint32_t)is_clamped;
-		chunk->flags |= b->flags[block];
-		chunk->traits |= (uint8_t)traits;
-		chunk->n_samples += cull_n_samples(in, block);
+		chunk.levels |= 1u << hit->level;
+		chunk.n_mixed += hit->is_mixed;
+		chunk.n_clamped += (uint32_t)is_clamped;
+		chunk.flags |= b->flags[block];
+		chunk.traits |= (uint8_t)traits;
+		chunk.n_samples += cull_n_samples(in, block);
 		const float error = cull_place_error(plan, in, traits, batch->apart[i], batch->depth_error[i]);
-		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
+		chunk.place_error = error > chunk.place_error ? error : chunk.place_error;
 		hit++;
 	}
 	to->hit = hit;
+	*to->chunk = chunk;
 }
 
 static void count_blocks(struct cull_counting *to)
