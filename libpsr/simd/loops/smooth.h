@@ -8,18 +8,27 @@
 
 #define MARGIN SMOOTH_REACH
 #define ROWS (2 * MARGIN + 1)
+#define FIRST 16 /* where pixels begin in a row: at a whole vector */
+#define LENGTH (FIRST + SMOOTH_WIDTH + 16)
 
-/* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane:
+/* A row and MARGIN pixels on each side of it: [FIRST] is the first. `near` is linear in the picture on any plane:
  * 1 / z' in perspective, else -z'. NaN outside of the picture: every comparison fails. */
 struct smooth_row {
-	float near[SMOOTH_WIDTH + 2 * MARGIN], limit[SMOOTH_WIDTH + 2 * MARGIN];
+	_Alignas(64) float near[LENGTH], limit[LENGTH];
 	/* Squared codes, close to linear; of the row and those beside it. So small that sums are exact. */
-	float light[3][SMOOTH_WIDTH + 2 * MARGIN];
+	float light[3][LENGTH];
 	int32_t is_empty;
+};
+
+/* Of each run of a row. */
+struct smooth_runs {
+	int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN]; /* all pixels around it are of its surface, even if that may not fall */
+	int32_t is_empty[SMOOTH_WIDTH / SMOOTH_RUN];  /* nothing is in it */
+	float nothing; /* how near nothing is */
 };
 _Static_assert(SMOOTH_WIDTH % SMOOTH_RUN == 0, "runs may reach beyond the last pixel, not beyond a row");
 
-/* Of a row, what is in the picture: at[i] of its first pixel and its margin, first <= i < end. */
+/* Of a row, what is in the picture: at + i of row[i], first <= i < end. */
 struct smooth_span {
 	size_t first, end;
 	ptrdiff_t at;
@@ -28,12 +37,11 @@ struct smooth_span {
 static struct smooth_span smooth_span_of(const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
 {
 	const int is_inside = y >= 0 && y < (int64_t)t->height;
-	const size_t first = x0 < MARGIN ? MARGIN - x0 : 0, left = t->width - x0, all = n + 2 * MARGIN;
-	const size_t end = left + MARGIN < all ? left + MARGIN : all;
-
+	const size_t first = FIRST - (x0 < MARGIN ? x0 : MARGIN), left = t->width - x0;
+	const size_t end = FIRST + (left < n + MARGIN ? left : n + MARGIN);
 	const ptrdiff_t row = (ptrdiff_t)(is_inside ? y : 0) * t->width;
 
-	return (struct smooth_span){ first, is_inside ? end : first, row + x0 - MARGIN };
+	return (struct smooth_span){ first, is_inside ? end : first, row + (ptrdiff_t)x0 - FIRST };
 }
 
 static void load_nearness(struct smooth_row *row, const struct smooth_target *t, const struct smooth_span *in)
@@ -51,7 +59,7 @@ static void load_nearness(struct smooth_row *row, const struct smooth_target *t,
 	row->is_empty = !has_any;
 	for (size_t i = 0; i < in->first; i++)
 		row->near[i] = row->limit[i] = NAN;
-	for (size_t i = in->end; i < SMOOTH_WIDTH + 2 * MARGIN; i++)
+	for (size_t i = in->end; i < LENGTH; i++)
 		row->near[i] = row->limit[i] = NAN;
 }
 
@@ -68,7 +76,7 @@ static void load_light(struct smooth_row *row, const struct smooth_target *t, co
 	}
 	for (int c = 0; c < 3; c++) {
 		memset(row->light[c], 0, in->first * sizeof *row->light[c]);
-		memset(row->light[c] + in->end, 0, (SMOOTH_WIDTH + 2 * MARGIN - in->end) * sizeof *row->light[c]);
+		memset(row->light[c] + in->end, 0, (LENGTH - in->end) * sizeof *row->light[c]);
 	}
 }
 
@@ -88,43 +96,44 @@ static inline int32_t smooth_code(float light)
 	return (int32_t)(__builtin_sqrtf(light) + 0.5f);
 }
 
-/* Whether no neighbour of a run of pixels lies behind, and those on their sides are of the same surface, even if it
- * may not fall. `row` points to the middle one of ROWS here and below; the run begins at its `first`. */
-static inline int32_t is_smooth_surface(const struct smooth_row *const *row, size_t first)
+/* `row` points to the middle one of ROWS here and below. Runs are looked at before any is drawn: their chains of
+ * comparisons overlap. */
+static void find_runs(struct smooth_runs *runs, const struct smooth_row *const *row, uint32_t n)
 {
 	const float *up = row[-1]->near, *own = row[0]->near, *down = row[1]->near;
 	const float *up_limit = row[-1]->limit, *own_limit = row[0]->limit, *down_limit = row[1]->limit;
-	int32_t is_one = 1;
 
-	for (size_t i = first; i < first + SMOOTH_RUN; i++) {
-		const float near = own[i], limit = own_limit[i];
+	for (size_t k = 0; k * SMOOTH_RUN < n; k++) {
+		int32_t is_inside = 1, has_any = 0;
 
-		is_one &= (up[i - 1] >= limit) & (up[i] >= limit) & (up[i + 1] >= limit) & (own[i - 1] >= limit)
-		          & (own[i + 1] >= limit) & (down[i - 1] >= limit) & (down[i] >= limit) & (down[i + 1] >= limit)
-		          & (near >= up_limit[i]) & (near >= down_limit[i]) & (near >= own_limit[i - 1])
-		          & (near >= own_limit[i + 1]);
+		for (size_t i = FIRST + k * SMOOTH_RUN; i < FIRST + (k + 1) * SMOOTH_RUN; i++) {
+			const float near = own[i], limit = own_limit[i];
+
+			is_inside &= (up[i - 1] >= limit) & (up[i] >= limit) & (up[i + 1] >= limit) & (own[i - 1] >= limit)
+			             & (own[i + 1] >= limit) & (down[i - 1] >= limit) & (down[i] >= limit) & (down[i + 1] >= limit)
+			             & (near >= up_limit[i - 1]) & (near >= up_limit[i]) & (near >= up_limit[i + 1])
+			             & (near >= own_limit[i - 1]) & (near >= own_limit[i + 1]) & (near >= down_limit[i - 1])
+			             & (near >= down_limit[i]) & (near >= down_limit[i + 1]);
+			has_any |= near > runs->nothing;
+		}
+		runs->is_inside[k] = is_inside;
+		runs->is_empty[k] = !has_any;
 	}
-	return is_one;
 }
 
-/* Whether none of the others lies before the run. */
-static inline int32_t are_corners_same(const struct smooth_row *const *row, size_t first)
+static inline void smooth_empty(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row)
 {
-	const float *up_limit = row[-1]->limit, *own = row[0]->near, *down_limit = row[1]->limit;
-	int32_t is_one = 1;
-
-	for (size_t i = first; i < first + SMOOTH_RUN; i++)
-		is_one &= (own[i] >= up_limit[i - 1]) & (own[i] >= up_limit[i + 1]) & (own[i] >= down_limit[i - 1])
-		          & (own[i] >= down_limit[i + 1]);
-	return is_one;
+	for (int c = 0; c < 3; c++)
+		for (size_t i = 0; i < SMOOTH_RUN; i++)
+			code[c][x + i] = smooth_code(row[0]->light[c][FIRST + x + i]);
 }
 
 static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
                                  const struct smooth_row *const *row)
 {
 	for (int c = 0; c < 3; c++) {
-		const float *a = row[-1]->light[c] + MARGIN + x, *o = row[0]->light[c] + MARGIN + x;
-		const float *b = row[1]->light[c] + MARGIN + x;
+		const float *a = row[-1]->light[c] + FIRST + x, *o = row[0]->light[c] + FIRST + x;
+		const float *b = row[1]->light[c] + FIRST + x;
 
 		for (ptrdiff_t i = 0; i < SMOOTH_RUN; i++)
 			code[c][x + (size_t)i] = smooth_code((4 * o[i] + ((a[i] + b[i]) + (o[i - 1] + o[i + 1]))) * (1 / 8.0f));
@@ -138,7 +147,7 @@ static inline void smooth_samples(int32_t (*restrict code)[SMOOTH_WIDTH], size_t
 	static const struct smooth_masks all = { -1, -1, -1, -1, { -1, -1, -1, -1 } };
 
 	for (size_t k = 0; k < SMOOTH_RUN; k++) {
-		const size_t i = x + k + MARGIN;
+		const size_t i = x + k + FIRST;
 		struct smooth_shares shares;
 
 		find_shares_around(&shares, weights, x + k, &all);
@@ -184,10 +193,10 @@ static inline int32_t is_same_aslant(float limit, float rise, float up, float ne
 
 /* Returns how many pixels have a neighbour behind. `weights` is NULL, or of the three rows in the middle. */
 static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
-                                                                   const struct smooth_row *const *row,
+                                                                   const struct smooth_row *const *row, float nothing,
                                                                    const struct smooth_weights *const *weights)
 {
-	const size_t first = x + MARGIN;
+	const size_t first = x + FIRST;
 	const struct smooth_row *up = row[-1], *own = row[0], *down = row[1];
 	const float *near_own = own->near + first;
 	float rightward[SMOOTH_RUN + 1], downward[SMOOTH_RUN], from_above[SMOOTH_RUN];
@@ -237,7 +246,7 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 			const float front = weights != NULL ? add_shares(a, o, b, &shares, mean) : mean;
 			const float back = 2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind);
 
-			code[c][x + k] = smooth_code(front * share + back * rest);
+			code[c][x + k] = smooth_code(psr_choose(near > nothing, front * share + back * rest, o[0]));
 		}
 		n_edges += edges > 0;
 	}
@@ -246,20 +255,23 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 
 /* Smooths a run. `weights`: NULL, or of the three rows in the middle. */
 static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row,
-                           const struct smooth_weights *const *weights)
+                           const struct smooth_runs *runs, const struct smooth_weights *const *weights)
 {
 	const size_t k = x / SMOOTH_RUN;
-	const int is_inside = is_smooth_surface(row, x + MARGIN);
 
-	if (weights != NULL && (weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k])) {
-		if (!is_inside || !are_corners_same(row, x + MARGIN))
-			return smooth_edges(code, x, row, weights);
-		smooth_samples(code, x, row, weights);
-	} else {
-		if (!is_inside)
-			return smooth_edges(code, x, row, NULL);
-		smooth_inside(code, x, row);
+	if (runs->is_empty[k]) {
+		smooth_empty(code, x, row);
+		return 0;
 	}
+	if (weights != NULL && !(weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k]))
+		weights = NULL;
+	if (!runs->is_inside[k])
+		return weights != NULL ? smooth_edges(code, x, row, runs->nothing, weights)
+		                       : smooth_edges(code, x, row, runs->nothing, NULL);
+	if (weights != NULL)
+		smooth_samples(code, x, row, weights);
+	else
+		smooth_inside(code, x, row);
 	return 0;
 }
 
@@ -268,6 +280,7 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	const uint32_t n = x1 - x0;
 	struct smooth_row rows[ROWS];
 	const struct smooth_row *row[ROWS];
+	struct smooth_runs runs = { .nothing = t->perspective ? 0 : -INFINITY };
 	struct smooth_weights weights[3];
 	const struct smooth_weights *around[3];
 	int32_t code[3][SMOOTH_WIDTH];
@@ -294,8 +307,9 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 			memcpy(to, t->from + 3 * ((size_t)own * t->width + x0), 3 * (size_t)n);
 			continue;
 		}
+		find_runs(&runs, row + MARGIN, n);
 		for (uint32_t x = 0; x < n; x += SMOOTH_RUN)
-			n_edges += smooth_run(code, x, row + MARGIN, t->place != NULL ? around : NULL);
+			n_edges += smooth_run(code, x, row + MARGIN, &runs, t->place != NULL ? around : NULL);
 		for (size_t i = 0; i < n; i++)
 			for (size_t c = 0; c < 3; c++)
 				to[3 * i + c] = (uint8_t)code[c][i];

@@ -24,7 +24,7 @@ static inline float masked(float value, int32_t mask)
 /* What the samples of a row weigh, of 128: [k][i] of pixel i - 1 of the piece in the one before it (k 0), in its own
  * and in the one behind it, by their columns and by their rows. */
 struct smooth_weights {
-	float across[3][SMOOTH_WIDTH + 2], down[3][SMOOTH_WIDTH + 2];
+	float across[3][SMOOTH_WIDTH + SMOOTH_RUN], down[3][SMOOTH_WIDTH + SMOOTH_RUN];
 	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN]; /* by run and a pixel more on each side */
 };
 
@@ -39,28 +39,51 @@ static inline void weigh_quarter(float *before, float *own, float *after, int32_
 	*after = (float)(from * from & is_there);
 }
 
-static void load_weights(struct smooth_weights *w, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
+/* The same for a run of places. */
+static void weigh_run(struct smooth_weights *w, const uint8_t *place, size_t first)
 {
-	const int is_inside = y >= 0 && y < (int64_t)t->height;
-	const size_t first = x0 == 0, left = t->width + 1 - x0, end = left < n + 2 ? left : n + 2;
-	uint8_t place[SMOOTH_WIDTH + 2];
-
-	memset(place, PSR_PLACE_NONE, sizeof place);
-	if (is_inside)
-		memcpy(place + first, t->place + (size_t)y * t->width + x0 + first - 1, end - first);
-	for (size_t i = 0; i < SMOOTH_WIDTH + 2; i++) {
+	for (size_t i = first; i < first + SMOOTH_RUN; i++) {
 		const int32_t code = place[i], is_there = -(code < PSR_PLACE_NONE);
 
 		weigh_quarter(&w->across[0][i], &w->across[1][i], &w->across[2][i], code & 3, is_there);
 		weigh_quarter(&w->down[0][i], &w->down[1][i], &w->down[2][i], code >> 2 & 3, is_there);
 	}
-	for (size_t k = 0; k < SMOOTH_WIDTH / SMOOTH_RUN; k++) {
-		uint8_t least = PSR_PLACE_NONE;
+}
 
-		for (size_t i = 0; i < SMOOTH_RUN + 2; i++)
-			least = place[k * SMOOTH_RUN + i] < least ? place[k * SMOOTH_RUN + i] : least;
-		w->has_any[k] = least < PSR_PLACE_NONE;
+static void weigh_nothing(struct smooth_weights *w, size_t first)
+{
+	for (int k = 0; k < 3; k++) {
+		memset(&w->across[k][first], 0, SMOOTH_RUN * sizeof *w->across[k]);
+		memset(&w->down[k][first], 0, SMOOTH_RUN * sizeof *w->down[k]);
 	}
+}
+
+static inline int has_place(const uint8_t *place, size_t n)
+{
+	uint8_t least = PSR_PLACE_NONE;
+
+	for (size_t i = 0; i < n; i++)
+		least = place[i] < least ? place[i] : least;
+	return least < PSR_PLACE_NONE;
+}
+
+static void load_weights(struct smooth_weights *w, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
+{
+	const int is_inside = y >= 0 && y < (int64_t)t->height;
+	const size_t first = x0 == 0, left = t->width + 1 - x0, end = left < n + 2 ? left : n + 2;
+	uint8_t place[SMOOTH_WIDTH + SMOOTH_RUN];
+
+	memset(place, PSR_PLACE_NONE, sizeof place);
+	if (is_inside)
+		memcpy(place + first, t->place + (size_t)y * t->width + x0 + first - 1, end - first);
+	for (size_t i = 0; i < n + 2; i += SMOOTH_RUN) {
+		if (has_place(place + i, SMOOTH_RUN))
+			weigh_run(w, place, i);
+		else
+			weigh_nothing(w, i);
+	}
+	for (size_t k = 0; k * SMOOTH_RUN < n; k++)
+		w->has_any[k] = has_place(place + k * SMOOTH_RUN, SMOOTH_RUN + 2);
 }
 
 /* The weights of the samples in a pixel and around it, by row, and what to multiply eighths of all with. */
