@@ -31,8 +31,8 @@ typedef void smooth_places_fn(uint8_t *place, const uint64_t *word, const uint16
 /* Smooths the pixels x0 <= x < x1, y0 <= y < y1, x1 at most SMOOTH_WIDTH more. Within a surface a pixel p becomes (4 p
  * + sum of its four neighbours) / 8; a neighbour of another surface counts as p. At an edge, neighbours behind show
  * through: e eighths of their mean, where e is 2 for each side neighbour and 1 for each diagonal one, at most 6, and
- * side neighbours count twice in the mean. Neighbours in front do not count. Means are of squared codes. Pixels where
- * nothing is stay as they are. Returns how many pixels have a neighbour behind.
+ * side neighbours count twice in the mean. Neighbours in front do not count. Means are of squared codes. Returns how
+ * many pixels have a neighbour behind.
  *
  * With places, p becomes the mean of samples of its surface in the pixel and the eight around it, weighed by a
  * quadratic B-spline of how far they lie from the pixel's middle along each axis; a 64th of a whole one's weight is the

@@ -20,11 +20,9 @@ struct smooth_row {
 	int32_t is_empty;
 };
 
-/* Of each run of a row. */
+/* Of each run of a row, whether all pixels around it are of its surface, even if that may not fall. */
 struct smooth_runs {
-	int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN]; /* all pixels around it are of its surface, even if that may not fall */
-	int32_t is_empty[SMOOTH_WIDTH / SMOOTH_RUN];  /* nothing is in it */
-	float nothing; /* how near nothing is */
+	int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN];
 };
 _Static_assert(SMOOTH_WIDTH % SMOOTH_RUN == 0, "runs may reach beyond the last pixel, not beyond a row");
 
@@ -104,7 +102,7 @@ static void find_runs(struct smooth_runs *runs, const struct smooth_row *const *
 	const float *up_limit = row[-1]->limit, *own_limit = row[0]->limit, *down_limit = row[1]->limit;
 
 	for (size_t k = 0; k * SMOOTH_RUN < n; k++) {
-		int32_t is_inside = 1, has_any = 0;
+		int32_t is_inside = 1;
 
 		for (size_t i = FIRST + k * SMOOTH_RUN; i < FIRST + (k + 1) * SMOOTH_RUN; i++) {
 			const float near = own[i], limit = own_limit[i];
@@ -114,18 +112,9 @@ static void find_runs(struct smooth_runs *runs, const struct smooth_row *const *
 			             & (near >= up_limit[i - 1]) & (near >= up_limit[i]) & (near >= up_limit[i + 1])
 			             & (near >= own_limit[i - 1]) & (near >= own_limit[i + 1]) & (near >= down_limit[i - 1])
 			             & (near >= down_limit[i]) & (near >= down_limit[i + 1]);
-			has_any |= near > runs->nothing;
 		}
 		runs->is_inside[k] = is_inside;
-		runs->is_empty[k] = !has_any;
 	}
-}
-
-static inline void smooth_empty(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row)
-{
-	for (int c = 0; c < 3; c++)
-		for (size_t i = 0; i < SMOOTH_RUN; i++)
-			code[c][x + i] = smooth_code(row[0]->light[c][FIRST + x + i]);
 }
 
 static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
@@ -193,7 +182,7 @@ static inline int32_t is_same_aslant(float limit, float rise, float up, float ne
 
 /* Returns how many pixels have a neighbour behind. `weights` is NULL, or of the three rows in the middle. */
 static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
-                                                                   const struct smooth_row *const *row, float nothing,
+                                                                   const struct smooth_row *const *row,
                                                                    const struct smooth_weights *const *weights)
 {
 	const size_t first = x + FIRST;
@@ -246,7 +235,7 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 			const float front = weights != NULL ? add_shares(a, o, b, &shares, mean) : mean;
 			const float back = 2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind);
 
-			code[c][x + k] = smooth_code(psr_choose(near > nothing, front * share + back * rest, o[0]));
+			code[c][x + k] = smooth_code(front * share + back * rest);
 		}
 		n_edges += edges > 0;
 	}
@@ -259,15 +248,10 @@ static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, con
 {
 	const size_t k = x / SMOOTH_RUN;
 
-	if (runs->is_empty[k]) {
-		smooth_empty(code, x, row);
-		return 0;
-	}
 	if (weights != NULL && !(weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k]))
 		weights = NULL;
 	if (!runs->is_inside[k])
-		return weights != NULL ? smooth_edges(code, x, row, runs->nothing, weights)
-		                       : smooth_edges(code, x, row, runs->nothing, NULL);
+		return weights != NULL ? smooth_edges(code, x, row, weights) : smooth_edges(code, x, row, NULL);
 	if (weights != NULL)
 		smooth_samples(code, x, row, weights);
 	else
@@ -280,7 +264,7 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	const uint32_t n = x1 - x0;
 	struct smooth_row rows[ROWS];
 	const struct smooth_row *row[ROWS];
-	struct smooth_runs runs = { .nothing = t->perspective ? 0 : -INFINITY };
+	struct smooth_runs runs;
 	struct smooth_weights weights[3];
 	const struct smooth_weights *around[3];
 	int32_t code[3][SMOOTH_WIDTH];
