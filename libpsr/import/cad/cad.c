@@ -181,7 +181,8 @@ static int take(struct import_mesh *im, struct cad_module_mesh *cad, struct psr_
 	if (rc != PSR_OK)
 		return rc;
 	if (cad->n_open > 0)
-		import_mesh_warn(im, "%u shells are open: their faces do not meet all around", cad->n_open);
+		import_mesh_warn(im, "%u shell%s open: faces do not meet all around", cad->n_open,
+		                 cad->n_open == 1 ? " is" : "s are");
 	rc = import_mesh_merge(im, err);
 	return rc == PSR_OK ? import_mesh_weld(im, err) : rc;
 }
