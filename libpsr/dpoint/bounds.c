@@ -65,10 +65,12 @@ static void raise_worst(struct measuring *m, double to)
 		;
 }
 
-/* What a point is off decides nothing where it is less than another one. */
+/* What a point is off decides nothing where it is less than another one, and than what was asked for: all that are over
+ * it are counted. */
 static int is_less(struct bound_view *view, const struct measuring *m, const struct dpoint_candidate *c)
 {
-	const double certain = SAFE * worst_of(m);
+	const double asked = (double)m->options->error, worst = worst_of(m);
+	const double certain = SAFE * (asked > 0 && asked < worst ? asked : worst);
 	float extent[2];
 
 	dpoint_candidate_extent(extent, c, m->options->sine);

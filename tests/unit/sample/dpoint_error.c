@@ -11,6 +11,7 @@
 #include "../lib/nearest.h"
 #include "base/random.h"
 #include "base/vec.h"
+#include "dpoint/bound.h"
 #include "dpoint/mesh.h"
 #include "sample/dpoint/of_mesh.h"
 
@@ -222,6 +223,25 @@ static void what_is_said_without_an_error_holds(void **state)
 	}
 }
 
+/* Kept points that are not within an error, each looked at alone. */
+static size_t count_over(const struct dpoint_surface *surface, const struct dpoint_choice *choice, double sine,
+                         double error)
+{
+	struct bound_view view = { .seen = NULL };
+	size_t n = 0;
+
+	for (size_t c = 0; c < surface->n_candidates; c++) {
+		float extent[2];
+
+		if (!choice->is_kept[c])
+			continue;
+		dpoint_candidate_extent(extent, &surface->candidate[c], sine);
+		n += bound_least(&view, &surface->facets, &surface->candidate[c].point, extent, error) > error;
+	}
+	bound_view_fini(&view);
+	return n;
+}
+
 /* Cells that were not cut for the error: some of a disc's, at its border, have no point that is within it. */
 static void what_cannot_hold_is_counted(void **state)
 {
@@ -229,7 +249,7 @@ static void what_cannot_hold_is_counted(void **state)
 		.sine = dpoint_sine(0.01), .slack = 2e-5f, .angle = 0.03f, .height = 1e-3f, .overhang = 5e-4f, .looks = 8,
 		.error = 1e-3f,
 	};
-	const struct dpoint_mesh_options options = { .scale = 1, .cell = 0.1, .delta = 0.125f };
+	const struct dpoint_mesh_options options = { .scale = 1, .cell = 0.02, .delta = 0.125f };
 	struct psr_mesh *mesh = mesh_of(&forms[N_FORMS - 1]);
 	struct dpoint_surface surface;
 	struct dpoint_cover cover = { 0 };
@@ -243,6 +263,7 @@ static void what_cannot_hold_is_counted(void **state)
 	assert_int_equal(dpoint_bounds_measure(&bounds, &surface, &choice, &cover_options, NULL), PSR_OK);
 	assert_true(bounds.n_over > 0 && bounds.n_over < choice.n_kept);
 	assert_true(bounds.worst > 1e-3 && bounds.worst < 0.1);
+	assert_int_equal(bounds.n_over, count_over(&surface, &choice, cover_options.sine, (double)cover_options.error));
 	assert_int_equal(choice.n_holes, 0);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
