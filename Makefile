@@ -504,7 +504,7 @@ bench-model: compile $(BENCH) ## bench-model: build the standard set and the dra
 	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)
 
 bench-simd: $(SIMD_TESTS) ## bench-simd: nanoseconds a sample (pixel, ...) of each kernel by instruction set
-	$(Q)for test in $(SIMD_TESTS); do $$test --bench || exit 1; done
+	$(Q)for test in $(SIMD_TESTS); do $$test --bench || exit 1; echo; done
 
 bench-reproject: compile $(REPROJECT_BENCH) ## bench-reproject: what warping received pictures costs, and how near it comes to the truth (only="bunny crowd")
 	$(Q)$(REPROJECT_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(only)

@@ -1,5 +1,5 @@
 # Lines of at most 100 columns: sentences are wrapped, and a table that is wider is printed in parts below each other, each
-# with the first column. Columns are what all rows have blanks (or "|") between.
+# with the first column. Columns are what all rows have blanks (or "|") between; rows that have none in common are wrapped.
 BEGIN { most = 100 }
 
 function is_sentence(line) {
@@ -78,7 +78,9 @@ function print_rows(   i, from, to) {
 			print row[i]
 	} else {
 		find_columns()
-		for (from = first + 1; from <= width; from = to + 1) {
+		for (i = 1; first >= most && i <= n_rows; i++)
+			print_wrapped(row[i])
+		for (from = first + 1; first < most && from <= width; from = to + 1) {
 			if (from > first + 1)
 				print ""
 			to = end_of_part(from)
