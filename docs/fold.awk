@@ -20,12 +20,14 @@ function print_sentences(   i) {
 	n_sentences = is_long = 0
 }
 
-function print_wrapped(line,   cut) {
+function print_wrapped(line,   cut, text) {
 	while (length(line) > most) {
 		cut = most + 1
 		while (cut > 1 && substr(line, cut, 1) != " ")
 			cut--
-		print substr(line, 1, cut - 1)
+		text = substr(line, 1, cut - 1)
+		sub(/ +$/, "", text)
+		print text
 		line = substr(line, cut + 1)
 	}
 	print line
