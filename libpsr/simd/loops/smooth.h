@@ -20,10 +20,6 @@ struct smooth_row {
 	int32_t is_empty;
 };
 
-/* Of each run of a row, whether all pixels around it are of its surface, even if that may not fall. */
-struct smooth_runs {
-	int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN];
-};
 _Static_assert(SMOOTH_WIDTH % SMOOTH_RUN == 0, "runs may reach beyond the last pixel, not beyond a row");
 
 /* Of a row, what is in the picture: at + i of row[i], first <= i < end. */
@@ -94,26 +90,26 @@ static inline int32_t smooth_code(float light)
 	return (int32_t)(__builtin_sqrtf(light) + 0.5f);
 }
 
-/* `row` points to the middle one of ROWS here and below. Runs are looked at before any is drawn: their chains of
- * comparisons overlap. */
-static void find_runs(struct smooth_runs *runs, const struct smooth_row *const *row, uint32_t n)
+/* Of each run of a row, whether all pixels around it are of its surface, even if that may not fall. Runs are looked at
+ * before any is drawn: their chains of comparisons overlap. `row` points to the middle one of ROWS here and below. */
+static void find_inside(int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN], const struct smooth_row *const *row, uint32_t n)
 {
 	const float *up = row[-1]->near, *own = row[0]->near, *down = row[1]->near;
 	const float *up_limit = row[-1]->limit, *own_limit = row[0]->limit, *down_limit = row[1]->limit;
 
 	for (size_t k = 0; k * SMOOTH_RUN < n; k++) {
-		int32_t is_inside = 1;
+		int32_t is_one = 1;
 
 		for (size_t i = FIRST + k * SMOOTH_RUN; i < FIRST + (k + 1) * SMOOTH_RUN; i++) {
 			const float near = own[i], limit = own_limit[i];
 
-			is_inside &= (up[i - 1] >= limit) & (up[i] >= limit) & (up[i + 1] >= limit) & (own[i - 1] >= limit)
-			             & (own[i + 1] >= limit) & (down[i - 1] >= limit) & (down[i] >= limit) & (down[i + 1] >= limit)
-			             & (near >= up_limit[i - 1]) & (near >= up_limit[i]) & (near >= up_limit[i + 1])
-			             & (near >= own_limit[i - 1]) & (near >= own_limit[i + 1]) & (near >= down_limit[i - 1])
-			             & (near >= down_limit[i]) & (near >= down_limit[i + 1]);
+			is_one &= (up[i - 1] >= limit) & (up[i] >= limit) & (up[i + 1] >= limit) & (own[i - 1] >= limit)
+			          & (own[i + 1] >= limit) & (down[i - 1] >= limit) & (down[i] >= limit) & (down[i + 1] >= limit)
+			          & (near >= up_limit[i - 1]) & (near >= up_limit[i]) & (near >= up_limit[i + 1])
+			          & (near >= own_limit[i - 1]) & (near >= own_limit[i + 1]) & (near >= down_limit[i - 1])
+			          & (near >= down_limit[i]) & (near >= down_limit[i + 1]);
 		}
-		runs->is_inside[k] = is_inside;
+		is_inside[k] = is_one;
 	}
 }
 
@@ -244,13 +240,13 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 
 /* Smooths a run. `weights`: NULL, or of the three rows in the middle. */
 static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row,
-                           const struct smooth_runs *runs, const struct smooth_weights *const *weights)
+                           int32_t is_inside, const struct smooth_weights *const *weights)
 {
 	const size_t k = x / SMOOTH_RUN;
 
 	if (weights != NULL && !(weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k]))
 		weights = NULL;
-	if (!runs->is_inside[k])
+	if (!is_inside)
 		return weights != NULL ? smooth_edges(code, x, row, weights) : smooth_edges(code, x, row, NULL);
 	if (weights != NULL)
 		smooth_samples(code, x, row, weights);
@@ -264,7 +260,7 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	const uint32_t n = x1 - x0;
 	struct smooth_row rows[ROWS];
 	const struct smooth_row *row[ROWS];
-	struct smooth_runs runs;
+	int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN];
 	struct smooth_weights weights[3];
 	const struct smooth_weights *around[3];
 	int32_t code[3][SMOOTH_WIDTH];
@@ -291,9 +287,9 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 			memcpy(to, t->from + 3 * ((size_t)own * t->width + x0), 3 * (size_t)n);
 			continue;
 		}
-		find_runs(&runs, row + MARGIN, n);
+		find_inside(is_inside, row + MARGIN, n);
 		for (uint32_t x = 0; x < n; x += SMOOTH_RUN)
-			n_edges += smooth_run(code, x, row + MARGIN, &runs, t->place != NULL ? around : NULL);
+			n_edges += smooth_run(code, x, row + MARGIN, is_inside[x / SMOOTH_RUN], t->place != NULL ? around : NULL);
 		for (size_t i = 0; i < n; i++)
 			for (size_t c = 0; c < 3; c++)
 				to[3 * i + c] = (uint8_t)code[c][i];

@@ -25,7 +25,7 @@ static inline float masked(float value, int32_t mask)
  * and in the one behind it, by their columns and by their rows. */
 struct smooth_weights {
 	float across[3][SMOOTH_WIDTH + SMOOTH_RUN], down[3][SMOOTH_WIDTH + SMOOTH_RUN];
-	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN]; /* by run and a pixel more on each side */
+	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN + 1]; /* by run and a pixel more on each side */
 };
 
 /* A quadratic B-spline at the eighths 1, 3, 5 and 7 of a pixel: 3/4 - d^2 at a distance d of up to a half of the
@@ -71,19 +71,20 @@ static void load_weights(struct smooth_weights *w, const struct smooth_target *t
 {
 	const int is_inside = y >= 0 && y < (int64_t)t->height;
 	const size_t first = x0 == 0, left = t->width + 1 - x0, end = left < n + 2 ? left : n + 2;
-	uint8_t place[SMOOTH_WIDTH + SMOOTH_RUN];
+	uint8_t place[SMOOTH_WIDTH + 2 * SMOOTH_RUN];
 
 	memset(place, PSR_PLACE_NONE, sizeof place);
 	if (is_inside)
 		memcpy(place + first, t->place + (size_t)y * t->width + x0 + first - 1, end - first);
 	for (size_t i = 0; i < n + 2; i += SMOOTH_RUN) {
-		if (has_place(place + i, SMOOTH_RUN))
+		const int has_own = has_place(place + i, SMOOTH_RUN);
+
+		if (has_own)
 			weigh_run(w, place, i);
 		else
 			weigh_nothing(w, i);
+		w->has_any[i / SMOOTH_RUN] = has_own | has_place(place + i + SMOOTH_RUN, 2);
 	}
-	for (size_t k = 0; k * SMOOTH_RUN < n; k++)
-		w->has_any[k] = has_place(place + k * SMOOTH_RUN, SMOOTH_RUN + 2);
 }
 
 /* The weights of the samples in a pixel and around it, by row, and what to multiply eighths of all with. */
