@@ -1,4 +1,5 @@
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include "bound.h"
@@ -16,8 +17,9 @@ struct measuring {
 	const struct dpoint_choice *choice;
 	const struct dpoint_cover_options *options;
 	struct dpoint_bounds *of_chunk;
-	double worst;  /* of the chunks that are measured so far: what is certainly below it is not measured. Which these are
-	                * depends on threads, the result does not: the worst chunk is never below another one. */
+	/* Of the chunks that are measured so far: what is certainly below it is not measured. Which these are depends on
+	 * threads, the result does not: the worst chunk is never below another one. */
+	_Atomic double worst;
 	int n_chunks;
 	int is_failed;
 };
@@ -48,20 +50,11 @@ static void look(struct dpoint_bounds *bounds, struct bound_view *view, const st
 	bounds->worst = asked > 0 && !is_over ? fmax(before, fmin(high, asked)) : high;
 }
 
-static double worst_of(const struct measuring *m)
-{
-	double worst;
-
-	__atomic_load(&m->worst, &worst, __ATOMIC_RELAXED);
-	return worst;
-}
-
 static void raise_worst(struct measuring *m, double to)
 {
-	double worst = worst_of(m);
+	double worst = m->worst;
 
-	while (to > worst &&
-	       !__atomic_compare_exchange(&m->worst, &worst, &to, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+	while (worst < to && !atomic_compare_exchange_weak(&m->worst, &worst, to))
 		;
 }
 
@@ -69,8 +62,8 @@ static void raise_worst(struct measuring *m, double to)
  * it are counted. */
 static int is_less(struct bound_view *view, const struct measuring *m, const struct dpoint_candidate *c)
 {
-	const double asked = (double)m->options->error, worst = worst_of(m);
-	const double certain = SAFE * (asked > 0 && asked < worst ? asked : worst);
+	const double asked = (double)m->options->error, worst = m->worst;
+	const double certain = SAFE * (asked > 0 ? fmin(asked, worst) : worst);
 	float extent[2];
 
 	dpoint_candidate_extent(extent, c, m->options->sine);
