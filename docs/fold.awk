@@ -75,14 +75,13 @@ function print_part(from, to,   i, text) {
 }
 
 function print_rows(   i, from, to) {
-	if (width <= most) {
-		for (i = 1; i <= n_rows; i++)
-			print row[i]
-	} else {
+	if (width > most)
 		find_columns()
-		for (i = 1; first >= most && i <= n_rows; i++)
+	if (width <= most || first >= most) {
+		for (i = 1; i <= n_rows; i++)
 			print_wrapped(row[i])
-		for (from = first + 1; first < most && from <= width; from = to + 1) {
+	} else {
+		for (from = first + 1; from <= width; from = to + 1) {
 			if (from > first + 1)
 				print ""
 			to = end_of_part(from)
