@@ -17,4 +17,8 @@ uint32_t radix_of_float(float x);
  * its use. */
 void radix_sort(struct radix_entry *entry, size_t n);
 
+/* Sorts n records, of so many bytes, by the uint64_t that each begins with, which is below 2^bits; those of one number
+ * stay in their order. spare: room for as many. Returns where they are then, record or spare. */
+void *radix_sort_records(void *record, void *spare, size_t bytes, size_t n, int bits);
+
 #endif

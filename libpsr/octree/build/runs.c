@@ -9,8 +9,8 @@
 #include "runs.h"
 #include "base/array.h"
 #include "base/mem.h"
+#include "base/radix.h"
 
-#define DIGIT 11
 #define LEAST_ROOM 64
 
 int runs_init(struct runs *runs, const char *folder, int bits, int is_scan, uint64_t memory, struct psr_error *err)
@@ -45,40 +45,14 @@ static inline uint64_t path_of(const uint8_t *record)
 	return path;
 }
 
-/* Sorts by digits from the lowest on, which keeps the order of equal paths. bytes: a constant of the caller. */
-static inline __attribute__((always_inline)) void sort_records(struct runs *runs, size_t bytes)
-{
-	size_t place[1 << DIGIT];
-
-	for (int shift = 0; shift < runs->bits; shift += DIGIT) {
-		uint8_t *swap = runs->record;
-		size_t sum = 0;
-
-		memset(place, 0, sizeof place);
-		for (size_t i = 0; i < runs->n; i++)
-			place[path_of(runs->record + i * bytes) >> shift & ((1 << DIGIT) - 1)]++;
-		for (size_t d = 0; d < sizeof place / sizeof *place; d++) {
-			const size_t count = place[d];
-
-			place[d] = sum;
-			sum += count;
-		}
-		for (size_t i = 0; i < runs->n; i++) {
-			const uint8_t *record = runs->record + i * bytes;
-
-			memcpy(runs->spare + bytes * place[path_of(record) >> shift & ((1 << DIGIT) - 1)]++, record, bytes);
-		}
-		runs->record = runs->spare;
-		runs->spare = swap;
-	}
-}
-
 static void sort(struct runs *runs)
 {
-	if (runs->bytes == sizeof(struct record))
-		sort_records(runs, sizeof(struct record));
-	else
-		sort_records(runs, sizeof(struct scan_record));
+	uint8_t *const sorted = radix_sort_records(runs->record, runs->spare, runs->bytes, runs->n, runs->bits);
+
+	if (sorted == runs->spare) {
+		runs->spare = runs->record;
+		runs->record = sorted;
+	}
 }
 
 /* Opens a file that has no name, or loses it at once. */

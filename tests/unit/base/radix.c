@@ -5,6 +5,7 @@
 #include <cmocka.h>
 #include <float.h>
 #include <stdlib.h>
+#include <string.h>
 #include "base/radix.h"
 #include "base/random.h"
 
@@ -49,6 +50,46 @@ static void test_sorts_and_keeps_the_order_of_equals(void **state)
 	check_sorted(5000, 0, 0);
 }
 
+/* Records of any size, by keys of 33 bits, which are three digits: they end in the other array. */
+static void check_records(size_t bytes)
+{
+	const size_t n = 3000;
+	uint8_t *record = malloc(n * bytes), *spare = malloc(n * bytes), *sorted;
+	uint64_t seed = bytes, last = 0, key, order;
+
+	assert_non_null(record);
+	assert_non_null(spare);
+	for (uint64_t i = 0; i < n; i++) {
+		uint8_t *const at = record + i * bytes;
+
+		key = (random_next(&seed) & 0xff) << (i & 1 ? 25 : 10);
+		memset(at, (int)(i % 251), bytes);
+		memcpy(at, &key, sizeof key);
+		memcpy(at + bytes - sizeof i, &i, sizeof i);
+	}
+	sorted = radix_sort_records(record, spare, bytes, n, 33);
+	assert_ptr_equal(sorted, spare);
+	for (uint64_t i = 0, before = 0; i < n; i++, last = key, before = order) {
+		const uint8_t *const at = sorted + i * bytes;
+
+		memcpy(&key, at, sizeof key);
+		memcpy(&order, at + bytes - sizeof order, sizeof order);
+		assert_true(key > last || (key == last && (i == 0 || order > before)));
+		for (size_t k = sizeof key; k < bytes - sizeof order; k++)
+			assert_int_equal(at[k], order % 251);
+	}
+	free(record);
+	free(spare);
+}
+
+static void test_sorts_records_of_any_size(void **state)
+{
+	(void)state;
+	check_records(16);
+	check_records(24);
+	check_records(29);
+}
+
 static void test_floats_are_in_their_order(void **state)
 {
 	static const float ascending[] = { -FLT_MAX, -2, -1, -FLT_MIN, -0x1p-149f, 0, 0x1p-149f, FLT_MIN, 1, 2, FLT_MAX };
@@ -63,6 +104,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sorts_and_keeps_the_order_of_equals),
+		cmocka_unit_test(test_sorts_records_of_any_size),
 		cmocka_unit_test(test_floats_are_in_their_order),
 	};
 
