@@ -343,33 +343,76 @@ static void mending_leaves_no_hole(void **state)
 	free(m);
 }
 
+/* Mends a lone cell of a surface that is one facet. */
+static void mend_one(struct dpoint_candidate *out, const float corner[4][3], const float normal[3],
+                     const float facet[3][3])
+{
+	const struct dpoint_cover_options options = { .sine = 0.02f, .slack = 1e-5f, .angle = 0.05f, .height = 0.001f };
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_cell *cell;
+
+	dpoint_surface_init(&surface);
+	cell = dpoint_surface_cell(&surface);
+	assert_non_null(cell);
+	memset(cell, 0, sizeof *cell);
+	memcpy(cell->corner, corner, sizeof cell->corner);
+	memcpy(cell->normal, normal, sizeof cell->normal);
+	assert_int_equal(facets_add(&surface.facets, facet[0], facet[1], facet[2]), PSR_OK);
+	assert_int_equal(facets_sort(&surface.facets), PSR_OK);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(surface.n_candidates, 1);
+	assert_int_equal(dpoint_cover_size(&cover, 0), 1);
+	*out = surface.candidate[0];
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+}
+
 /* Of a cell whose surface leans by 30 degrees from its plane, that is within the facets: a point in the plane stays on
  * them, one that leans as the surface is a fortieth off at the ends. */
 static void mending_stays_nearest(void **state)
 {
 	static const float corner[4][3] = { { 0, 0, 0 }, { 0.1f, 0, 0 }, { 0.1f, 0.1f, 0 }, { 0, 0.1f, 0 } };
 	static const float facet[3][3] = { { -1, -1, 0 }, { 3, -1, 0 }, { -1, 3, 0 } };
-	const struct dpoint_cover_options options = { .sine = 0.02f, .slack = 1e-5f, .angle = 0.05f, .height = 0.001f };
-	struct dpoint_surface surface;
-	struct dpoint_cover cover;
-	struct dpoint_cell *cell;
+	static const float leaning[3] = { 0.5f, 0, 0.8660254f };
+	struct dpoint_candidate point;
 
 	(void)state;
-	dpoint_surface_init(&surface);
-	cell = dpoint_surface_cell(&surface);
-	assert_non_null(cell);
-	memset(cell, 0, sizeof *cell);
-	memcpy(cell->corner, corner, sizeof corner);
-	cell->normal[0] = 0.5f;
-	cell->normal[2] = 0.8660254f;
-	assert_int_equal(facets_add(&surface.facets, facet[0], facet[1], facet[2]), PSR_OK);
-	assert_int_equal(facets_sort(&surface.facets), PSR_OK);
-	assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
-	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
-	assert_int_equal(surface.n_candidates, 1);
-	assert_true(surface.candidate[0].point.normal[2] > 0.99f);
-	dpoint_cover_fini(&cover);
-	dpoint_surface_fini(&surface);
+	mend_one(&point, corner, leaning, facet);
+	assert_true(point.point.normal[2] > 0.99f);
+}
+
+/* A slanted piece, whose surface ends below its short side, or above: a rectangle along its longest sides, at 59 degrees
+ * to the edge, would reach beyond it by 0.0353. One along the edge covers the piece, too. That reaches 0.05 down to the
+ * edge and 0.07 aside, rounded up: 0.015 of both together, 19 % of a class, and pi / 256 of a turn of the sides. */
+static void mending_ends_at_a_slanted_edge(void **state)
+{
+	static const float upright[3] = { 0, 0, 1 };
+	static const float piece[4][2] = { { 0, 0 }, { 0.08f, 0 }, { 0.14f, 0.1f }, { 0.06f, 0.1f } };
+	const double over = 1.19 * (0.05 + 0.015 * 0.12 + 0.07 * 1.19 * 3.1416 / 256) - 0.05;
+
+	(void)state;
+	assert_true(over < 0.015);
+	for (int is_above = 0; is_above < 2; is_above++)
+		for (int first = 0; first < 4; first++) { /* whichever corner comes first */
+			const float end = is_above ? 0.1f : 0, far = is_above ? -6 : 6;
+			const float facet[3][3] = { { is_above ? 6 : -6, end, 0 }, { is_above ? -6 : 6, end, 0 }, { 0, far, 0 } };
+			struct dpoint_candidate c;
+			float corner[4][3], v[3];
+
+			for (int i = 0; i < 4; i++)
+				v3f_set(corner[i], piece[(i + first) % 4][0], piece[(i + first) % 4][1], 0);
+			mend_one(&c, (const float(*)[3])corner, upright, facet);
+			v3f_cross(v, c.point.normal, c.point.u);
+			for (int i = 0; i < 4; i++) {
+				float at[3];
+
+				v3f_add_scaled(at, c.point.at, i & 1 ? c.delta[0] : -c.delta[0], c.point.u);
+				v3f_add_scaled(at, at, i & 2 ? c.delta[1] : -c.delta[1], v);
+				assert_true(is_above ? at[1] <= 0.1 + over : at[1] >= -over);
+			}
+		}
 }
 
 static double area_of(const struct dpoint_cell *cell)
@@ -518,6 +561,7 @@ int main(void)
 		cmocka_unit_test(two_turns_cover_all_with_little_more),
 		cmocka_unit_test(mending_leaves_no_hole),
 		cmocka_unit_test(mending_stays_nearest),
+		cmocka_unit_test(mending_ends_at_a_slanted_edge),
 		cmocka_unit_test(narrow_triangles_have_pieces_that_are_not),
 		cmocka_unit_test(pieces_are_cut_where_normals_turn),
 		cmocka_unit_test(too_many_pieces_are_refused),
