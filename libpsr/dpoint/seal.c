@@ -12,16 +12,16 @@
 #define AROUND 8  /* directions of a slant */
 #define PLACES 9  /* of a cell: corners, middles of sides, the middle */
 #define INWARDS 0.9f
-#define GRAZED 2.5f /* of `behind`, for rays along a wall: they get as much further before they are as deep */
+#define GRAZED 2.5f /* of `behind`, for grazing rays: they get as much further before they are as deep */
 #define BEHIND 6  /* of options->height: three samples of a mesh's resolution ([G] 7.2) */
 
-#define FRONT (1 + 2 * AROUND) /* rays from in front of a cell; more are from behind it */
-#define DIRECTIONS (FRONT + AROUND)
+#define STEEP (1 + 2 * AROUND) /* rays to any cell; more graze cells of two sides */
+#define DIRECTIONS (STEEP + AROUND)
 
-#define GRAZING 0.12f
+#define GRAZING 0.08f
 
-/* Cosines of rays to the cell's normal. The last ones, 83 degrees off, are from behind alone: who looks into what is
- * hollow and open sees its walls aslant as far as they go. */
+/* Cosines of rays to the cell's normal. The last ones, 85.4 degrees off, are to cells of two sides alone: who looks into
+ * what is hollow and open sees its walls aslant as far as they go. */
 static const float slant[3] = { 0.65f, LID_LEAST_COSINE, GRAZING };
 
 struct sealing {
@@ -75,7 +75,7 @@ static int stop_rays(uint8_t *is_stopped, int n_open, int n, const struct lid *l
                      const float (*from)[3], float behind)
 {
 	for (int d = 0; d < n; d++)
-		if (!is_stopped[d] && lid_stops(lid, p, from[d], d < FRONT ? behind : GRAZED * behind)) {
+		if (!is_stopped[d] && lid_stops(lid, p, from[d], d < STEEP ? behind : GRAZED * behind)) {
 			is_stopped[d] = 1;
 			n_open--;
 		}
@@ -93,7 +93,7 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 		struct near_lid *near = &nearby->near[i];
 
 		rectangle_sees(near->place, &near->lid->rectangle, at);
-		if (lid_stops_all(near->lid, near->place, normal, n > FRONT ? GRAZING : LID_LEAST_COSINE, s->behind))
+		if (lid_stops_all(near->lid, near->place, normal, n > STEEP ? GRAZING : LID_LEAST_COSINE, s->behind))
 			return 1;
 	}
 	for (int is_over = 1; is_over >= 0; is_over--)
@@ -179,12 +179,14 @@ static int stops_all(const struct sealing *s, const struct lid *lid, const struc
 static int stops_rays(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
                       const float (*from)[DIRECTIONS][3], const float middle[3])
 {
-	for (int side = 0; side < 1 + dpoint_is_two_sided(s->options, cell->part); side++)
+	const int n_sides = 1 + dpoint_is_two_sided(s->options, cell->part);
+
+	for (int side = 0; side < n_sides; side++)
 		for (int p = 0; p < PLACES; p++) {
 			float place[3];
 
 			place_of(place, cell, middle, p);
-			if (!is_sealed_at(s, nearby, place, from[side], from[side][0], side == 0 ? FRONT : DIRECTIONS))
+			if (!is_sealed_at(s, nearby, place, from[side], from[side][0], n_sides == 1 ? STEEP : DIRECTIONS))
 				return 0;
 		}
 	return 1;
