@@ -13,7 +13,7 @@ scans=$(ls "$fetched/dragon.ply" "$fetched/armadillo.off" "$fetched/bunny.obj" 2
 
 [ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-offsets \
 	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats dpoint \
-	dpoint-models dpoint-splats dpoint-frames dpoint-equal dpoint-holes dpoint-error
+	dpoint-models dpoint-splats dpoint-frames dpoint-bytes dpoint-equal dpoint-holes dpoint-error
 for study; do
 	echo "study $study" >&2
 	plot=()
@@ -23,7 +23,8 @@ for study; do
 	octree) models=(-r 512 --models "${scans}pinetree,terrain,scan:terrain") ;;
 	octree-prefixes) models=(-r 512 --models "${scans}pinetree,scan:terrain") ;;
 	octree-splats) models=(--models "${scans}teapot") ;;
-	dpoint-holes) models=(--models "teapot,gavel,toybird,chair$(ls "$fetched/fandisk.off" "$fetched/bunny.obj" 2>/dev/null | sed 's/^/,/' | tr -d '\n')") ;;
+	dpoint-bytes) models=(--models "teapot,gavel$(ls "$fetched/fandisk.off" 2>/dev/null | sed 's/^/,/')") ;;
+	dpoint-holes) models=(--models "teapot,gavel,toybird,chair$(ls "$fetched/fandisk.off" "$fetched/bunny.obj" "$fetched/lionhead.off" 2>/dev/null | sed 's/^/,/' | tr -d '\n')") ;;
 	dpoint-models)
 		[ -f "$fetched/lionhead.off" ] && [ -f "$fetched/fandisk.off" ] ||
 			{ echo "lionhead.off and fandisk.off are not here: make models fetches them" >&2; continue; }

@@ -99,6 +99,11 @@ static const struct study_kind tables[] = {
 	{ "dpoint", "[K] table 1", "differential points: simplification", table_dpoint, "teapot",
 	  "kB: [K]'s points have 62 bytes, ours 16, and fitted ones are in groups. Errors, in degrees and radii\n"
 	  "of the model, are those of each kept point at each place that it covers; holes: what no point covers.", NULL },
+	{ "dpoint-bytes", "[K] 6", "bytes of points, and of blocks that are as good at magnification 4", table_dpoint_bytes,
+	  "teapot,gavel",
+	  "Pictures of 800x600, as those of dpoint-frames, of the brightest place; blocks of as many pixels as points and more.\n"
+	  "kB: in memory; times: those of points. dB: inside the object, plain and in pass 1, of 2x2 sub-pixels; less: what\n"
+	  "blocks have less than points.", NULL },
 	{ "dpoint-equal", "[K] 6", "a highlight at magnification 8: points, and blocks of as much time", table_dpoint_equal,
 	  "teapot,toybird",
 	  "Pictures of 800x600, as those of dpoint-frames; points, and blocks of as many pixels or more. edges: smoothed;\n"

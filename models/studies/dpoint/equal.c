@@ -25,6 +25,7 @@ static const struct setting {
 	unsigned pass;
 } setting[] = {
 	{ "points", 0, PSR_SMOOTH_NONE, 0 },
+	{ "points, edges", 0, PSR_SMOOTH_EDGES, 0 },
 	{ "points, pass 1", 0, PSR_SMOOTH_NONE, 1 },
 	{ "blocks", 1, PSR_SMOOTH_NONE, 0 },
 	{ "blocks, edges", 1, PSR_SMOOTH_EDGES, 0 },
@@ -100,10 +101,7 @@ static int build(struct subject *s, const struct study_model *of)
 	int rc = study_dpoint_of_mesh(&s->points, s->view.study, of);
 
 	for (int i = 0; i < N_FINER && rc == PSR_OK; i++) {
-		struct study finer = *s->view.study;
-
-		finer.resolution <<= i;
-		rc = study_build(&s->blocks[i], NULL, &finer, of);
+		rc = study_dpoint_blocks(&s->blocks[i], s->view.study, of, 1u << i);
 		study_step(s->view.study, of->name);
 	}
 	return rc;

@@ -182,3 +182,11 @@ int study_dpoint_of_mesh(struct psr_model **out, const struct study *study, cons
 	dpoint_set_fini(&set);
 	return rc;
 }
+
+int study_dpoint_blocks(struct psr_model **out, const struct study *study, const struct study_model *of, uint32_t times)
+{
+	struct study finer = *study;
+
+	finer.resolution *= times;
+	return study_build(out, NULL, &finer, of);
+}

@@ -70,11 +70,17 @@ int study_dpoint_model(struct psr_model **out, struct study *study, const struct
 /* Makes a model of the mesh's differential points as psr-model build does. */
 int study_dpoint_of_mesh(struct psr_model **out, const struct study *study, const struct study_model *of);
 
+/* Makes a model of the mesh's blocks, of so many times the study's resolution. */
+int study_dpoint_blocks(struct psr_model **out, const struct study *study, const struct study_model *of, uint32_t times);
+
 int table_dpoint(struct study *study);
 int table_dpoint_holes(struct study *study);
 int table_dpoint_meshes(struct study *study);
 int table_dpoint_error(struct study *study);
 int table_dpoint_frames(struct study *study);
+
+/* A magnified picture, with blocks that are as good. */
+int table_dpoint_bytes(struct study *study);
 
 /* A magnified highlight, with blocks of as much time. */
 int table_dpoint_equal(struct study *study);
