@@ -11,7 +11,7 @@ mkdir -p docs/studies
 fetched=${XDG_CACHE_HOME:-$HOME/.cache}/psr/models
 scans=$(ls "$fetched/dragon.ply" "$fetched/armadillo.off" "$fetched/bunny.obj" 2>/dev/null | tr '\n' ,)
 
-[ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-offsets \
+[ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling octree octree-points octree-offsets \
 	octree-alias octree-rates octree-levels octree-prefixes octree-parts octree-splats dpoint \
 	dpoint-models dpoint-splats dpoint-frames dpoint-bytes dpoint-equal dpoint-holes dpoint-error
 for study; do
@@ -20,7 +20,7 @@ for study; do
 	grep -q "(studies/$study.svg)" $page && plot=(--plot "$work/$study.svg")
 	models=()
 	case $study in
-	octree) models=(-r 512 --models "${scans}pinetree,terrain,scan:terrain") ;;
+	octree | octree-points) models=(-r 512 --models "${scans}pinetree,terrain,scan:terrain") ;;
 	octree-prefixes) models=(-r 512 --models "${scans}pinetree,scan:terrain") ;;
 	octree-splats) models=(--models "${scans}teapot") ;;
 	dpoint-bytes) models=(--models "teapot,gavel$(ls "$fetched/fandisk.off" 2>/dev/null | sed 's/^/,/')") ;;

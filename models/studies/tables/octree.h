@@ -29,12 +29,22 @@ struct octree_drawn {
 /* A way to show a model. */
 struct octree_way {
 	const struct psr_model *model;
-	int with_splats;
+	int with_splats, is_whole; /* is_whole: down to its leaves, even where the picture needs fewer levels */
 };
 
 /* Draws all views in each of n ways, in turn. Needs study->renderer. */
 int octree_compare(struct octree_drawn *drawn, struct study *study, const struct study_model *of,
                    const struct octree_way *way, int n, const struct octree_truth *truth);
+
+/* Sums of all views: seconds of a frame, and of its cull and warp (the least of several); points after culling, and those
+ * of them that were placed in the picture and do not face away. */
+struct octree_rate {
+	double seconds, warp_seconds, drawn, warped;
+};
+
+/* The same without a truth. */
+int octree_rates(struct octree_rate *rate, struct study *study, const struct study_model *of,
+                 const struct octree_way *way, int n);
 
 /* Draws all views of a model with these settings, of OCTREE_SIDE pixels. Needs study->renderer. */
 int octree_score(struct octree_drawn *drawn, struct study *study, const struct study_model *of,

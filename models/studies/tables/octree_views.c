@@ -11,9 +11,10 @@
 #include "sample/octree/of_mesh.h"
 
 #define RAYS 4      /* along the side of a pixel */
-#define TRIALS 9    /* frames of each view and model, in turn; the median counts */
+#define TRIALS 9    /* frames of each view and model, in turn; the least time counts: other work only adds to it */
 #define DISTANCE 4  /* of the eye, in radii */
 #define MARGIN 1.05
+#define LEAST_SPACING (1.0 / 64) /* of psr/render.h */
 
 static const double directions[OCTREE_VIEWS][3] = { { 0.5, 0.4, 1 }, { -0.9, 0.7, 0.6 }, { 0.3, -0.35, -1 } };
 
@@ -50,19 +51,12 @@ static void set_stage(struct stage *stage, const struct study_model *of, const d
 	stage->scene.n_instances = stage->scene.n_lights = 1;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-	const double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 /* What is compared, and what comes of it. */
 struct comparison {
 	struct study *study;
 	const struct octree_way *way;
 	int n;
-	double seconds[OCTREE_MOST_WAYS];
+	struct octree_rate rate[OCTREE_MOST_WAYS]; /* sums of the views */
 	struct sums {                     /* of the views of a model */
 		double square, square_inside; /* over pixels that are covered; inside: for decibels */
 		double n, n_inside, n_wrong;  /* of these; wrong: holes and leaks */
@@ -75,28 +69,38 @@ static int draw_way(const struct comparison *c, int i, struct stage *stage, stru
 
 	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
 	settings.with_ewa = c->way[i].with_splats;
+	if (c->way[i].is_whole)
+		settings.spacing_px = LEAST_SPACING;
 	stage->instance.model = c->way[i].model;
 	return renderer_draw(c->study->renderer, &stage->scene, &settings, c->study->pool, frame, c->study->err);
 }
 
-/* Draws the view in each way in turn, and adds the median seconds of each. */
+/* Draws the view in each way in turn, and adds the least seconds of each, and what it draws. */
 static int time_view(struct comparison *c, struct stage *stage, struct psr_frame *frame)
 {
-	double time[OCTREE_MOST_WAYS][TRIALS];
+	struct octree_rate least[OCTREE_MOST_WAYS];
 
 	for (int trial = 0; trial <= TRIALS; trial++)
 		for (int i = 0; i < c->n; i++) {
 			const uint64_t start = clock_ns();
 			const int rc = draw_way(c, i, stage, frame);
+			const double seconds = (double)(clock_ns() - start) * 1e-9;
+			const struct psr_report *report = &frame->report;
+			const double warp_seconds = (double)(report->ns[PSR_STAGE_CULL] + report->ns[PSR_STAGE_WARP]) * 1e-9;
 
 			if (rc != PSR_OK)
 				return rc;
-			if (trial > 0) /* the first one warms */
-				time[i][trial - 1] = (double)(clock_ns() - start) * 1e-9;
+			if (trial <= 1) /* the first one warms */
+				least[i] = (struct octree_rate){ seconds, warp_seconds, (double)report->n_samples_drawn,
+					                             (double)report->count[PSR_STAGE_WARP] };
+			least[i].seconds = fmin(least[i].seconds, seconds);
+			least[i].warp_seconds = fmin(least[i].warp_seconds, warp_seconds);
 		}
 	for (int i = 0; i < c->n; i++) {
-		qsort(time[i], TRIALS, sizeof time[0][0], compare_doubles);
-		c->seconds[i] += time[i][TRIALS / 2];
+		c->rate[i].seconds += least[i].seconds;
+		c->rate[i].warp_seconds += least[i].warp_seconds;
+		c->rate[i].drawn += least[i].drawn;
+		c->rate[i].warped += least[i].warped;
 	}
 	return PSR_OK;
 }
@@ -157,8 +161,26 @@ int octree_compare(struct octree_drawn *drawn, struct study *study, const struct
 			return rc;
 	}
 	for (int i = 0; i < n; i++)
-		drawn[i] = drawn_of(&c.sums[i], c.seconds[i]);
+		drawn[i] = drawn_of(&c.sums[i], c.rate[i].seconds);
 	return PSR_OK;
+}
+
+int octree_rates(struct octree_rate *rate, struct study *study, const struct study_model *of,
+                 const struct octree_way *way, int n)
+{
+	struct psr_frame frame;
+	struct comparison c = { .study = study, .way = way, .n = n };
+	int rc = psr_frame_alloc(&frame, OCTREE_SIDE, OCTREE_SIDE, 1u << PSR_PLANE_COLOR, study->err);
+
+	for (int v = 0; rc == PSR_OK && v < OCTREE_VIEWS; v++) {
+		struct stage stage;
+
+		set_stage(&stage, of, directions[v]);
+		rc = time_view(&c, &stage, &frame);
+	}
+	psr_frame_free(&frame);
+	memcpy(rate, c.rate, (size_t)n * sizeof *rate);
+	return rc;
 }
 
 int octree_score(struct octree_drawn *drawn, struct study *study, const struct study_model *of,

@@ -66,6 +66,7 @@ int table_masks(struct study *study);
 int table_subdivision(struct study *study);
 int table_culling(struct study *study);
 int table_octree(struct study *study);
+int table_octree_points(struct study *study);
 int table_octree_prefixes(struct study *study);
 int table_octree_splats(struct study *study);
 
