@@ -394,7 +394,7 @@ $(VIEW_BENCH): $(VIEW_BENCH_O) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a $(
 $(LATENCY): $(addprefix $(BUILD)/tests/bench/,latency.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a \
 		$(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
-$(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(A)
+$(FIRST): $(addprefix $(BUILD)/tests/bench/,cold.c.o first.c.o first_mesh.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
 TRUTH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child report truth truth_build truth_rows truth_table))
 $(TRUTH): $(TRUTH_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
@@ -410,7 +410,7 @@ $(LARGE_OCTREE): $(BUILD)/tests/bench/large_octree.c.o $(LIB)/libpsr.a
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
 .PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cad bench-cancel bench-codec bench-daemon bench-dpoint bench-effects bench-model bench-octree bench-pool
-.PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
+.PHONY: bench-first bench-first-cold bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 # PSR_TEST names tests as tests/run does; only what they run is built. Scripts run programs of tests/tools and soak.
 ifneq ($(and $(PSR_TEST),$(filter check,$(MAKECMDGOALS))),)
@@ -499,6 +499,13 @@ bench-effects: compile $(EFFECTS) ## bench-effects: what a light, a highlight, a
 
 bench-first: compile $(FIRST) ## bench-first: seconds from psr view FILE to its first picture, by step and format (files="scan.ply")
 	$(Q)mkdir -p $(BUILD)/bench-first && $(FIRST) $(abspath $(BIN)) $(BUILD)/bench-first $(files)
+
+bench-first-cold: compile $(FIRST) $(OCTREE_BENCH) ## bench-first-cold: seconds from OPEN to the first picture of 20 M points, of a model and while it is built, with the file out of memory
+	$(Q)mkdir -p $(BUILD)/bench-first
+	$(Q)[ -f $(BUILD)/bench-first/cloud.las ] || $(BUILD)/tests/bench/octree -w $(BUILD)/bench-first/cloud.las >/dev/null
+	$(Q)[ -f $(BUILD)/bench-first/model.psr ] || $(BIN)/psr-model build $(BUILD)/bench-first/cloud.las --levels 12 \
+		-o $(BUILD)/bench-first/model.psr
+	$(Q)$(FIRST) -c $(abspath $(BIN)) $(BUILD)/bench-first $(BUILD)/bench-first/model.psr $(BUILD)/bench-first/cloud.las
 
 bench-model: compile $(BENCH) ## bench-model: build the standard set and the dragon; time, memory, size, adequacy and rays beside targets (only="teapot top")
 	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)
