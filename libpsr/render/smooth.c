@@ -31,13 +31,14 @@ void smooth_clear(struct smooth *smooth)
 	psr_free_huge(smooth->storage, smooth->storage_size);
 }
 
-/* A row of bricks, tile by tile. Copies the background of quiet parts. */
+/* A row of parts, tile by tile. Copies the background of quiet ones. */
 static void smooth_row(int row, void *userdata)
 {
 	struct smoothing *s = userdata;
 	const struct plan *plan = s->plan;
 	const struct smooth_target *t = &s->target;
-	const uint32_t y0 = (uint32_t)row * BRICK, y1 = y0 + BRICK < plan->height ? y0 + BRICK : plan->height;
+	const uint32_t y0 = (uint32_t)row * PART_HEIGHT, below = y0 + PART_HEIGHT;
+	const uint32_t y1 = below < plan->height ? below : plan->height;
 	uint64_t n_edges = 0;
 
 	for (uint32_t x0 = 0; x0 < plan->width; x0 += TILE_WIDTH) {
@@ -55,7 +56,7 @@ static void smooth_row(int row, void *userdata)
 	}
 	atomic_fetch_add_explicit(&s->smooth->n_edges, n_edges, memory_order_relaxed);
 }
-_Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_WIDTH <= 2 * PART_WIDTH && TILE_HEIGHT % BRICK == 0, "");
+_Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_WIDTH <= 2 * PART_WIDTH && TILE_HEIGHT % PART_HEIGHT == 0, "");
 
 int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                    uint8_t *rgb)
@@ -72,5 +73,6 @@ int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct 
 		smoothing.target.offset = ldexpf(step, plan->exponent);
 	}
 	atomic_store(&smooth->n_edges, 0);
-	return psr_pool_for_until(pool, &plan->cancel, (int)((plan->height + BRICK - 1) / BRICK), smooth_row, &smoothing);
+	const int n_rows = (int)((plan->height + PART_HEIGHT - 1) / PART_HEIGHT);
+	return psr_pool_for_until(pool, &plan->cancel, n_rows, smooth_row, &smoothing);
 }

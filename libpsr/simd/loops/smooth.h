@@ -90,8 +90,19 @@ static inline int32_t smooth_code(float light)
 	return (int32_t)(__builtin_sqrtf(light) + 0.5f);
 }
 
-/* Of each run of a row, whether all pixels around it are of its surface, even if that may not fall. Runs are looked at
- * before any is drawn: their chains of comparisons overlap. `row` points to the middle one of ROWS here and below. */
+static inline float lesser(float a, float b)
+{
+	return a < b ? a : b;
+}
+
+static inline float greater(float a, float b)
+{
+	return a > b ? a : b;
+}
+
+/* Of each run of a row, whether all pixels around it are of its surface, even if that may not fall: whether the
+ * farthest around a pixel is within its limit, and it within all limits around it. Runs are looked at before any is
+ * drawn: their chains of comparisons overlap. `row` points to the middle one of ROWS here and below. */
 static void find_inside(int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN], const struct smooth_row *const *row, uint32_t n)
 {
 	const float *up = row[-1]->near, *own = row[0]->near, *down = row[1]->near;
@@ -101,16 +112,30 @@ static void find_inside(int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN], const stru
 		int32_t is_one = 1;
 
 		for (size_t i = FIRST + k * SMOOTH_RUN; i < FIRST + (k + 1) * SMOOTH_RUN; i++) {
-			const float near = own[i], limit = own_limit[i];
+			const float far = lesser(lesser(lesser(up[i - 1], up[i]), lesser(up[i + 1], own[i - 1])),
+			                         lesser(lesser(own[i + 1], down[i - 1]), lesser(down[i], down[i + 1])));
+			const float limit = greater(
+				greater(greater(up_limit[i - 1], up_limit[i]), greater(up_limit[i + 1], own_limit[i - 1])),
+				greater(greater(own_limit[i + 1], down_limit[i - 1]), greater(down_limit[i], down_limit[i + 1])));
 
-			is_one &= (up[i - 1] >= limit) & (up[i] >= limit) & (up[i + 1] >= limit) & (own[i - 1] >= limit)
-			          & (own[i + 1] >= limit) & (down[i - 1] >= limit) & (down[i] >= limit) & (down[i + 1] >= limit)
-			          & (near >= up_limit[i - 1]) & (near >= up_limit[i]) & (near >= up_limit[i + 1])
-			          & (near >= own_limit[i - 1]) & (near >= own_limit[i + 1]) & (near >= down_limit[i - 1])
-			          & (near >= down_limit[i]) & (near >= down_limit[i + 1]);
+			is_one &= (far >= own_limit[i]) & (own[i] >= limit);
 		}
 		is_inside[k] = is_one;
 	}
+}
+
+/* Runs with pixels at the picture's border are not inside: what is beyond it is nobody's surface. */
+static void leave_border(int32_t is_inside[SMOOTH_WIDTH / SMOOTH_RUN], const struct smooth_target *t, uint32_t x0,
+                         uint32_t n, uint32_t y)
+{
+	const size_t n_runs = (n + SMOOTH_RUN - 1) / SMOOTH_RUN;
+
+	if (y == 0 || y == t->height - 1)
+		memset(is_inside, 0, n_runs * sizeof *is_inside);
+	if (x0 == 0)
+		is_inside[0] = 0;
+	if (x0 + n_runs * SMOOTH_RUN >= t->width)
+		is_inside[n_runs - 1] = 0;
 }
 
 static inline void smooth_inside(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
@@ -266,6 +291,8 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	int32_t code[3][SMOOTH_WIDTH];
 	uint32_t n_edges = 0;
 
+	for (int k = 0; k < 3; k++)
+		memset(weights[k].has_own, 1, sizeof weights[k].has_own); /* what is there is not known */
 	for (int64_t y = (int64_t)y0 - MARGIN; y < (int64_t)y1 + MARGIN; y++) {
 		const struct smooth_span in = smooth_span_of(t, x0, n, y), next = smooth_span_of(t, x0, n, y - MARGIN + 1);
 		const int64_t own = y - MARGIN;
@@ -288,6 +315,7 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 			continue;
 		}
 		find_inside(is_inside, row + MARGIN, n);
+		leave_border(is_inside, t, x0, n, (uint32_t)own);
 		for (uint32_t x = 0; x < n; x += SMOOTH_RUN)
 			n_edges += smooth_run(code, x, row + MARGIN, is_inside[x / SMOOTH_RUN], t->place != NULL ? around : NULL);
 		for (size_t i = 0; i < n; i++)

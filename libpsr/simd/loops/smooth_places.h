@@ -25,18 +25,19 @@ static inline float masked(float value, int32_t mask)
  * and in the one behind it, by their columns and by their rows. */
 struct smooth_weights {
 	float across[3][SMOOTH_WIDTH + SMOOTH_RUN], down[3][SMOOTH_WIDTH + SMOOTH_RUN];
-	uint8_t has_any[SMOOTH_WIDTH / SMOOTH_RUN + 1]; /* by run and a pixel more on each side */
+	/* By run, and by run and a pixel more on each side. */
+	uint8_t has_own[SMOOTH_WIDTH / SMOOTH_RUN + 1], has_any[SMOOTH_WIDTH / SMOOTH_RUN + 1];
 };
 
 /* A quadratic B-spline at the eighths 1, 3, 5 and 7 of a pixel: 3/4 - d^2 at a distance d of up to a half of the
  * middle, (3/2 - d)^2 / 2 up to one and a half. */
 static inline void weigh_quarter(float *before, float *own, float *after, int32_t quarter, int32_t is_there)
 {
-	const int32_t from = 2 * quarter + 1, to = 7 - 2 * quarter, off = 2 * quarter - 3;
+	const float from = 2 * (float)quarter + 1, to = 8 - from, off = from - 4;
 
-	*before = (float)(to * to & is_there);
-	*own = (float)((96 - 2 * off * off) & is_there);
-	*after = (float)(from * from & is_there);
+	*before = masked(to * to, is_there);
+	*own = masked(96 - 2 * (off * off), is_there);
+	*after = masked(from * from, is_there);
 }
 
 /* The same for a run of places. */
@@ -58,15 +59,24 @@ static void weigh_nothing(struct smooth_weights *w, size_t first)
 	}
 }
 
-static inline int has_place(const uint8_t *place, size_t n)
-{
-	uint8_t least = PSR_PLACE_NONE;
+_Static_assert(SMOOTH_RUN == 16 && PSR_PLACE_NONE == 16, "as the next two have");
 
-	for (size_t i = 0; i < n; i++)
-		least = place[i] < least ? place[i] : least;
-	return least < PSR_PLACE_NONE;
+/* Whether any of a run's places, each at most PSR_PLACE_NONE, is one. */
+static inline int has_place(const uint8_t *place)
+{
+	const uint64_t none = UINT64_C(0x1010101010101010);
+	uint64_t some[2];
+
+	memcpy(some, place, sizeof some);
+	return (some[0] & some[1]) != none;
 }
 
+static inline int has_place_of_two(const uint8_t *place)
+{
+	return (place[0] & place[1]) != PSR_PLACE_NONE;
+}
+
+/* What the weights of an earlier row were stays where both have none. */
 static void load_weights(struct smooth_weights *w, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
 {
 	const int is_inside = y >= 0 && y < (int64_t)t->height;
@@ -76,14 +86,15 @@ static void load_weights(struct smooth_weights *w, const struct smooth_target *t
 	memset(place, PSR_PLACE_NONE, sizeof place);
 	if (is_inside)
 		memcpy(place + first, t->place + (size_t)y * t->width + x0 + first - 1, end - first);
-	for (size_t i = 0; i < n + 2; i += SMOOTH_RUN) {
-		const int has_own = has_place(place + i, SMOOTH_RUN);
+	for (size_t i = 0, k = 0; i < n + 2; i += SMOOTH_RUN, k++) {
+		const int has_own = has_place(place + i);
 
 		if (has_own)
 			weigh_run(w, place, i);
-		else
+		else if (w->has_own[k])
 			weigh_nothing(w, i);
-		w->has_any[i / SMOOTH_RUN] = has_own | has_place(place + i + SMOOTH_RUN, 2);
+		w->has_own[k] = (uint8_t)has_own;
+		w->has_any[k] = (uint8_t)(has_own | has_place_of_two(place + i + SMOOTH_RUN));
 	}
 }
 
@@ -126,13 +137,29 @@ static inline float add_shares(const float *a, const float *o, const float *b, c
 	return (((above + beside) + below) + mean * (SMOOTH_MEAN / 8)) * s->whole;
 }
 
+static inline void place_run(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
+{
+	uint32_t low[SMOOTH_RUN], high[SMOOTH_RUN];
+
+	for (uint32_t i = 0; i < n; i++) {
+		low[i] = (uint32_t)word[i];
+		high[i] = (uint32_t)(word[i] >> 32);
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t is_empty = (low[i] == (uint32_t)PSR_WORD_EMPTY) & (high[i] == (uint32_t)(PSR_WORD_EMPTY >> 32));
+		const uint32_t none = 0u - (is_empty | (weight[i] < GAPS_WHOLE / 2));
+
+		place[i] = (uint8_t)((low[i] & (PSR_PLACE_NONE - 1) & ~none) | (PSR_PLACE_NONE & none));
+	}
+}
+
 static void smooth_places(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
 {
-	for (uint32_t x = 0; x < n; x++) {
-		const int is_there = word[x] != PSR_WORD_EMPTY && weight[x] >= GAPS_WHOLE / 2;
+	const uint32_t whole = n / SMOOTH_RUN * SMOOTH_RUN;
 
-		place[x] = is_there ? (uint8_t)(word[x] & ((1 << PSR_PLACE_BITS) - 1)) : PSR_PLACE_NONE;
-	}
+	for (uint32_t x = 0; x < whole; x += SMOOTH_RUN)
+		place_run(place + x, word + x, weight + x, SMOOTH_RUN);
+	place_run(place + whole, word + whole, weight + whole, n - whole);
 }
 
 #endif
