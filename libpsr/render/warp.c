@@ -116,26 +116,28 @@ int warp_looks(const struct plan *plan, uint32_t n)
 	return plan->cull_tests & PSR_CULL_OCCLUSION && (n >= least || plan->is_full);
 }
 
-/* As how many blocks, groups of points or cubes of a surface a tile's entries are: a cube of a surface has sixteen
- * leaves in the mean, one of a sparse cloud a few. */
-static uint32_t n_blocks_of(const struct plan *plan, const struct warp_target *t, const struct bin_entry *entry,
-                            uint32_t n_entries)
+/* As how many blocks of a smooth surface a tile's entries are: these have half of their samples, cubes of a surface
+ * sixteen leaves in the mean. Groups of points count as one. */
+static uint32_t n_blocks_of(const struct warp_target *t, const struct bin_entry *entry, uint32_t n_entries)
 {
 	const struct psr_blocks *last = NULL;
 	float n = 0, share = 1;
-
-	if (!plan->has_octrees)
-		return n_entries;
 
 	for (uint32_t e = 0; e < n_entries; e++) {
 		const struct warp_instance *in = &t->instance[entry[e].instance];
 		const int is_run = in->cubes != NULL && t->cubes != NULL;
 
-		if (in->cubes != NULL && in->blocks != last) {
-			last = in->blocks;
-			share = fminf((float)last->n_samples / (16 * (float)last->n_blocks), 1);
+		if (in->points != NULL) {
+			n++;
+			continue;
 		}
-		n += in->cubes != NULL ? share * (float)(is_run ? cull_count_bits(t->cubes[entry[e].hit]) : 1) : 1;
+		if (in->blocks != last) {
+			const float whole = in->cubes != NULL ? 16 : 32;
+
+			last = in->blocks;
+			share = fminf((float)last->n_samples / (whole * (float)last->n_blocks), 1);
+		}
+		n += is_run ? share * (float)cull_count_bits(t->cubes[entry[e].hit]) : share;
 	}
 	return (uint32_t)n;
 }
@@ -151,7 +153,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	target.clean = into->clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
 	target.cubes = plan->with_runs ? bins->cubes : NULL;
-	if (warp_looks(plan, n_blocks_of(plan, &target, bins->entry + begin, end - begin))) {
+	if (warp_looks(plan, n_blocks_of(&target, bins->entry + begin, end - begin))) {
 		simd->warp_clear(&target, into->stack->levels);
 		counts = warp_near_to_far(simd, plan, bins, &target, begin, end);
 	} else {
