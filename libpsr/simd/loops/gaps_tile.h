@@ -46,11 +46,11 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack, 
 		if (is_inside) {
 			const uint64_t *word = psr_zstack_row(stack, tile->y0 + i - GAPS_MARGIN) + tile->x0 - left;
 
-			for (uint32_t x = 0; x < n; x++)
+			for (uint32_t x = 0; x < n; x++) {
 				z[x] = psr_float_from_bits((uint32_t)(word[x] >> 32));
+				has_samples |= z[x] < INFINITY;
+			}
 		}
-		for (uint32_t x = 0; x < GAPS_STRIDE; x++)
-			has_samples |= row[x] < INFINITY;
 		tile->has_samples[i] = has_samples;
 	}
 }
