@@ -31,7 +31,14 @@ void smooth_clear(struct smooth *smooth)
 	psr_free_huge(smooth->storage, smooth->storage_size);
 }
 
-/* A row of parts, tile by tile. Copies the background of quiet ones. */
+static uint32_t end_of_part(const struct plan *plan, uint32_t x)
+{
+	const uint32_t end = (x / PART_WIDTH + 1) * PART_WIDTH;
+
+	return end < plan->width ? end : plan->width;
+}
+
+/* A row of parts, two at a time that are not quiet. Copies the background of quiet ones. */
 static void smooth_row(int row, void *userdata)
 {
 	struct smoothing *s = userdata;
@@ -41,10 +48,11 @@ static void smooth_row(int row, void *userdata)
 	const uint32_t y1 = below < plan->height ? below : plan->height;
 	uint64_t n_edges = 0;
 
-	for (uint32_t x0 = 0; x0 < plan->width; x0 += TILE_WIDTH) {
-		const uint32_t x1 = x0 + TILE_WIDTH < plan->width ? x0 + TILE_WIDTH : plan->width;
-
-		if (!plan_is_quiet(plan, x0, y0) || !plan_is_quiet(plan, x1 - 1, y0)) {
+	for (uint32_t x0 = 0, x1; x0 < plan->width; x0 = x1) {
+		x1 = end_of_part(plan, x0);
+		if (!plan_is_quiet(plan, x0, y0)) {
+			if (x1 < plan->width && !plan_is_quiet(plan, x1, y0))
+				x1 = end_of_part(plan, x1);
 			n_edges += s->simd->smooth(t, x0, x1, y0, y1);
 			continue;
 		}
@@ -56,7 +64,7 @@ static void smooth_row(int row, void *userdata)
 	}
 	atomic_fetch_add_explicit(&s->smooth->n_edges, n_edges, memory_order_relaxed);
 }
-_Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_WIDTH <= 2 * PART_WIDTH && TILE_HEIGHT % PART_HEIGHT == 0, "");
+_Static_assert(2 * PART_WIDTH <= SMOOTH_WIDTH, "");
 
 int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                    uint8_t *rgb)
