@@ -8,6 +8,15 @@
 #include "psr/error.h"
 #include "psr/mesh.h"
 
+enum cad_module_doing { CAD_MODULE_PARSES, CAD_MODULE_SHAPES, CAD_MODULE_CUTS };
+
+/* What reading came to; true at any time, also if it never ends. */
+struct cad_module_report {
+	volatile enum cad_module_doing doing;
+	uint32_t n_lacking;      /* entities of shapes with a parameter that refers to nothing, or to what it should not */
+	char first_lacking[160]; /* the first one's number, its type, and what is wrong; printable */
+};
+
 struct cad_module_source {
 	const char *path;
 	int is_iges;            /* else STEP */
@@ -22,6 +31,7 @@ struct cad_module_source {
 	int n_threads;          /* that may cut faces, of all cores; other readings at the same time change it. The result does
 	                         * not depend on it */
 	uint64_t max_triangles;
+	struct cad_module_report *report;
 };
 
 /* Triangles of all faces, in millimetres, with the surface's own normals at their corners. Faces that meet share
@@ -60,7 +70,7 @@ typedef int cad_module_read(struct cad_module_mesh **out, const struct cad_modul
 typedef void cad_module_destroy(struct cad_module_mesh *mesh); /* NULL is fine */
 
 /* The module exports one of these, named psr_cad_module. Raise the version with every change of this file. */
-#define CAD_MODULE_VERSION 4
+#define CAD_MODULE_VERSION 5
 struct cad_module {
 	uint32_t version; /* CAD_MODULE_VERSION of the module's own build; first in every version */
 	cad_module_read *read;

@@ -42,21 +42,23 @@ void use_threads(int n)
 	OSD_ThreadPool::DefaultPool()->SetNbDefaultThreadsToLaunch(n);
 }
 
-void expect_whole(STEPCAFControl_Reader &reader)
+void expect_whole(STEPCAFControl_Reader &reader, cad_module_report *report)
 {
-	cad_expect_whole(reader.ChangeReader().WS()->Model());
+	cad_expect_whole(report, reader.ChangeReader().WS()->Model());
 }
 
-void expect_whole(IGESCAFControl_Reader &) {}
+void expect_whole(IGESCAFControl_Reader &, cad_module_report *) {}
 
-template <typename Reader> void transfer(Reader &reader, const Handle(TDocStd_Document) &document, const char *path)
+template <typename Reader> void transfer(Reader &reader, const Handle(TDocStd_Document) &document,
+                                            const cad_module_source *source)
 {
 	reader.SetColorMode(Standard_True);
 	reader.SetNameMode(Standard_True);
-	if (reader.ReadFile(path) != IFSelect_RetDone)
+	if (reader.ReadFile(source->path) != IFSelect_RetDone)
 		throw cad_failure(PSR_ERR_FORMAT, "its entities cannot be parsed");
-	expect_whole(reader);
+	expect_whole(reader, source->report);
 	Handle(TDocStd_Document) to = document;
+	source->report->doing = CAD_MODULE_SHAPES;
 	if (!reader.Transfer(to))
 		throw cad_failure(PSR_ERR_FORMAT, "none of its shapes can be read");
 }
@@ -115,6 +117,7 @@ void read(cad_module_mesh *out, const cad_module_source *source)
 	open_document opened;
 	TDF_LabelSequence roots;
 	cad_walk w;
+	source->report->doing = CAD_MODULE_PARSES;
 	Message::DefaultMessenger()->ChangePrinters().Clear();
 	IGESControl_Controller::Init();
 	STEPControl_Controller::Init();
@@ -123,12 +126,13 @@ void read(cad_module_mesh *out, const cad_module_source *source)
 	w.number({ 0, 0, 0, -1 });
 	if (source->is_iges) {
 		IGESCAFControl_Reader reader;
-		transfer(reader, opened.document, source->path);
+		transfer(reader, opened.document, source);
 		take_entity_colors(w, reader);
 	} else {
 		STEPCAFControl_Reader reader;
-		transfer(reader, opened.document, source->path);
+		transfer(reader, opened.document, source);
 	}
+	source->report->doing = CAD_MODULE_CUTS;
 	w.shapes = XCAFDoc_DocumentTool::ShapeTool(opened.document->Main());
 	w.colors = XCAFDoc_DocumentTool::ColorTool(opened.document->Main());
 	w.shapes->GetFreeShapes(roots);
@@ -148,10 +152,7 @@ void read(cad_module_mesh *out, const cad_module_source *source)
 
 int fail(char *message, unsigned size, int code, const char *text)
 {
-	std::snprintf(message, size, "%s", text != nullptr && text[0] != '\0' ? text : "Open CASCADE gives no reason");
-	for (char *c = message; *c != '\0'; c++)
-		if (static_cast<unsigned char>(*c) < ' ')
-			*c = ' ';
+	cad_print(message, size, text != nullptr && text[0] != '\0' ? text : "Open CASCADE gives no reason");
 	return code;
 }
 

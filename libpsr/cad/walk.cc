@@ -123,8 +123,8 @@ void cad_walk::part(const TDF_Label &label, const TopLoc_Location &location, uin
 	faces(label, shape, location, inherited, own);
 }
 
-void cad_walk::faces(const TDF_Label &label, const TopoDS_Shape &shape, const TopLoc_Location &location, uint32_t inherited,
-                 const TopTools_DataMapOfShapeInteger &own)
+void cad_walk::faces(const TDF_Label &label, const TopoDS_Shape &shape, const TopLoc_Location &location,
+                     uint32_t inherited, const TopTools_DataMapOfShapeInteger &own)
 {
 	for (TopExp_Explorer it(shape, TopAbs_FACE); it.More(); it.Next()) {
 		const int *c = own.Seek(it.Current());

@@ -4,6 +4,8 @@
 #include <string.h>
 #include "base/cad_module.h"
 #include "dpoint/patch.h"
+#include "import/cad/apart.h"
+#include "import/cad/iges.h"
 #include "import/import.h"
 
 #define PER_PIXEL 8       /* triangles are off by this part of a pixel of the model */
@@ -16,8 +18,6 @@
 #define RIM 2.5e-5
 #define HEAD 4096
 #define TAIL 65536        /* of a file; its end is in there */
-#define CARD 80           /* bytes of a line of IGES */
-#define SECTION 72        /* of them, that come before the section's letter */
 
 static int is_step_ending(const char *path)
 {
@@ -41,7 +41,7 @@ static int is_step(const char *path, const uint8_t *bytes, size_t n_bytes)
 static int is_iges(const char *path, const uint8_t *bytes, size_t n_bytes)
 {
 	return is_iges_ending(path) ||
-	       (n_bytes > CARD && bytes[SECTION] == 'S' && memcmp(bytes + SECTION + 1, "      1", 7) == 0);
+	       import_iges_is(bytes, n_bytes);
 }
 
 int import_cad_is(const char *path, const uint8_t *bytes, size_t n_bytes)
@@ -59,46 +59,6 @@ static int check_step(const struct import_mesh *im, const uint8_t *bytes, size_t
 		return psr_fail(err, PSR_ERR_FORMAT,
 		                "%s: the STEP file ends in the middle: END-ISO-10303-21; is missing after %zu bytes; export it "
 		                "again", im->path, n_bytes);
-	return PSR_OK;
-}
-
-/* Lines of sections S, G, D and P are numbered, and the last one, T, has their numbers. */
-static int check_iges(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
-{
-	static const char letter[] = "SGDPT";
-	unsigned long long counted[5] = { 0 }, told[4];
-	char last[CARD + 1] = "";
-	size_t at = 0;
-
-	while (at + SECTION < n_bytes) {
-		const uint8_t *end = memchr(bytes + at, '\n', n_bytes - at);
-		const size_t next = end != NULL ? (size_t)(end - bytes) + 1 : n_bytes;
-		const int letter_here = next - at > SECTION ? bytes[at + SECTION] : 0;
-		const char *section = letter_here != 0 ? strchr(letter, letter_here) : NULL;
-
-		if (section == NULL)
-			break;
-		counted[section - letter]++;
-		if (*section == 'T')
-			snprintf(last, sizeof last, "%.*s", SECTION, (const char *)bytes + at);
-		at = next;
-	}
-	if (counted[0] == 0)
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: not an IGES file in lines of %d bytes: column %d of the first has no S", im->path, CARD,
-		                SECTION + 1);
-	if (counted[4] == 0)
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: the IGES file ends in the middle: its last line, of section T, is missing after %zu bytes;"
-		                " export it again", im->path, n_bytes);
-	if (sscanf(last, "S%7llu G%7llu D%7llu P%7llu", &told[0], &told[1], &told[2], &told[3]) != 4)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: the last line of the IGES file does not tell its sections' lines",
-		                im->path);
-	for (int i = 0; i < 4; i++)
-		if (told[i] != counted[i])
-			return psr_fail(err, PSR_ERR_FORMAT,
-			                "%s: section %c of the IGES file has %llu lines, and its last line tells %llu", im->path,
-			                letter[i], counted[i], told[i]);
 	return PSR_OK;
 }
 
@@ -198,10 +158,11 @@ int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 		.max_triangles = IMPORT_MAX_TRIANGLES / 4,
 	};
 	const struct cad_module *module;
+	struct cad_module_report report;
 	struct cad_module_mesh *cad;
 	struct psr_error why;
-	char message[300] = "";
-	int rc = source.is_iges ? check_iges(im, bytes, n_bytes, err) : check_step(im, bytes, n_bytes, err);
+	char message[400] = "";
+	int rc = source.is_iges ? import_iges_check(im, bytes, n_bytes, err) : check_step(im, bytes, n_bytes, err);
 
 	if (rc != PSR_OK)
 		return rc;
@@ -210,10 +171,13 @@ int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 		return psr_fail(err, rc,
 		                "%s: %s; STEP and IGES are read through Open CASCADE: install libocct-data-exchange-dev and "
 		                "build psr again, or convert the file to glTF or STL", im->path, why.text);
-	rc = module->read(&cad, &source, message, sizeof message);
+	rc = import_cad_apart(&cad, &report, module, &source, message, sizeof message);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%s: the %s file cannot be read: %s", im->path, source.is_iges ? "IGES" : "STEP",
 		                message);
+	if (report.n_lacking > 0)
+		import_mesh_warn(im, "%u of the file's entities %s to nothing or to a wrong type, and may be missing, first %s",
+		                 report.n_lacking, report.n_lacking == 1 ? "refers" : "refer", report.first_lacking);
 	rc = take(im, cad, err);
 	module->destroy(cad);
 	return rc;
