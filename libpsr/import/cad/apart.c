@@ -106,13 +106,25 @@ static int fail(char *message, unsigned size, int code, const char *what)
 	return code;
 }
 
+/* A child that crashes may have written anything there. */
+static struct cad_module_report checked(const struct cad_module_report *shared)
+{
+	struct cad_module_report report = *shared;
+
+	if ((unsigned)report.doing > CAD_MODULE_CUTS)
+		report.doing = CAD_MODULE_CUTS;
+	report.first_lacking[sizeof report.first_lacking - 1] = '\0';
+	return report;
+}
+
 /* What the end of a child means that did not give everything. */
-static int explain(char *message, unsigned size, int status, const struct cad_module_report *report)
+static int explain(char *message, unsigned size, int status, const struct cad_module_report *shared)
 {
 	static const char *const words[] = {
 		[CAD_MODULE_PARSES] = "reads its entities", [CAD_MODULE_SHAPES] = "makes shapes of its entities",
 		[CAD_MODULE_CUTS] = "cuts its faces into triangles",
 	};
+	const struct cad_module_report report = checked(shared);
 	const int number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
 	int is_crash = number == 0;
 
@@ -120,9 +132,9 @@ static int explain(char *message, unsigned size, int status, const struct cad_mo
 		is_crash |= number == crashes[i];
 	if (!is_crash)
 		kill(getpid(), number);
-	snprintf(message, size, "Open CASCADE crashes while it %s (%s): %s%s; export it again", words[report->doing],
-	         number != 0 ? strsignal(number) : "it ends the process", report->n_lacking > 0 ? "entity " :
-	         "an entity may be empty, or a part of itself", report->n_lacking > 0 ? report->first_lacking : "");
+	snprintf(message, size, "Open CASCADE crashes while it %s (%s): %s%s; export it again", words[report.doing],
+	         number != 0 ? strsignal(number) : "it ends the process", report.n_lacking > 0 ? "entity " :
+	         "an entity may be empty, or a part of itself", report.n_lacking > 0 ? report.first_lacking : "");
 	return PSR_ERR_FORMAT;
 }
 
@@ -177,7 +189,7 @@ int import_cad_apart(struct cad_module_mesh **out, struct cad_module_report *rep
 	close(fd[1]);
 	if (child > 0) {
 		code = take(out, fd[0], child, module, with.report, message, message_size);
-		*report = *with.report;
+		*report = checked(with.report);
 	} else {
 		code = fail(message, message_size, PSR_ERR_IO, "a process of its own");
 		close(fd[0]);
