@@ -9,6 +9,7 @@
 #include "simd/isa.h"
 #include "server.h"
 #include "server/models/cache.h"
+#include "server/models/rescan.h"
 #include "server/net/accept.h"
 #include "server/session/session.h"
 
@@ -25,77 +26,19 @@ struct server {
 	struct psr_pool *io;         /* reads models and folders, hashes sources */
 	struct codec *codec;
 	struct catalogue catalogue;
+	struct rescan rescan;
 	struct builder *builder;
 	struct opener *opener;
 	struct residence *residence;
 	struct frames *frames;
 	struct sessions sessions;
-	int is_draining, is_scanning, must_scan_again, is_ticking;
+	int is_draining, is_ticking;
 	uint64_t drain_end_us;
-};
-
-struct scan {
-	struct server *server;
-	struct loop_note note;
-	struct catalogue_listing *listing;
-	struct psr_error error;
-	int code;
 };
 
 static uint64_t to_us(double seconds)
 {
 	return (uint64_t)(seconds * 1e6);
-}
-
-/* ---- the models folder ---- */
-
-static void scan_job(void *userdata);
-
-static void start_scan(struct server *server)
-{
-	struct scan *scan;
-
-	if (server->is_scanning) {
-		server->must_scan_again = 1;
-		return;
-	}
-	scan = calloc(1, sizeof *scan);
-	if (scan != NULL)
-		scan->server = server;
-	if (scan == NULL || psr_pool_submit(server->io, &(struct pool_job){ .fn = scan_job, .userdata = scan }) != PSR_OK) {
-		free(scan);
-		log_warn("no memory to read the models folder again");
-		return;
-	}
-	server->is_scanning = 1;
-}
-
-static void on_scanned(void *userdata)
-{
-	struct scan *scan = userdata;
-	struct server *server = scan->server;
-
-	server->is_scanning = 0;
-	if (scan->code != PSR_OK) {
-		log_warn("the models folder was not read again: %s", scan->error.text);
-	} else {
-		catalogue_adopt(&server->catalogue, scan->listing);
-		log_info("models folder read again: %zu models", server->catalogue.n);
-	}
-	free(scan);
-	if (server->must_scan_again) {
-		server->must_scan_again = 0;
-		start_scan(server);
-	}
-}
-
-static void scan_job(void *userdata)
-{
-	struct scan *scan = userdata;
-
-	scan->code = catalogue_scan(&scan->listing, scan->server->options->models, &scan->error);
-	scan->note = (struct loop_note){ .fn = on_scanned, .userdata = scan };
-	loop_post(&scan->server->loop, &scan->note);
 }
 
 /* ---- the end ---- */
@@ -149,7 +92,7 @@ static void go_on_draining(struct server *server)
 		}
 	}
 	if (server->loop.now_us >= server->drain_end_us
-	    || (server->conns.first == NULL && frames_running(server->frames) == 0 && !server->is_scanning
+	    || (server->conns.first == NULL && frames_running(server->frames) == 0 && !server->rescan.is_running
 	        && !is_reading(server)))
 		loop_stop(&server->loop);
 }
@@ -161,7 +104,7 @@ static void on_signal(int number, void *userdata)
 	struct server *server = userdata;
 
 	if (number == SIGHUP && !server->is_draining)
-		start_scan(server);
+		rescan_start(&server->rescan);
 	else if (number == SIGCHLD && server->builder != NULL)
 		builder_reap(server->builder);
 	else if (number == SIGTERM || number == SIGINT)
@@ -274,6 +217,9 @@ static int create_parts(struct server *server)
 		return PSR_ERR_MEMORY;
 	psr_pool_keep_apart(server->pool);
 	server->catalogue.io = server->io;
+	server->rescan = (struct rescan){
+		.loop = &server->loop, .io = server->io, .catalogue = &server->catalogue, .models = options->models,
+	};
 	server->catalogue.others = (struct catalogue_others){ others_held, server };
 	if (opener_create(&server->opener, &(struct opener_parts){
 	        .loop = &server->loop, .io = server->io, .catalogue = &server->catalogue, .builder = server->builder,
@@ -388,7 +334,7 @@ int server_run(struct server *server, struct psr_error *err)
 	log_info("serving %zu models with %d threads and %s", server->catalogue.n, psr_pool_threads(server->pool),
 	         psr_isa_name(psr_isa_get()));
 	code = loop_run(&server->loop, err);
-	if (frames_running(server->frames) > 0 || is_reading(server) || server->is_scanning) {
+	if (frames_running(server->frames) > 0 || is_reading(server) || server->rescan.is_running) {
 		/* The drain time is over. Jobs that still draw or read cannot be stopped, and psrd does not wait for them. */
 		log_info("ended in the middle of %u frames", frames_running(server->frames));
 		builder_destroy(server->builder);
