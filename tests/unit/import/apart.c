@@ -128,6 +128,7 @@ static int wait_for_ever(struct cad_module_mesh **out, const struct cad_module_s
 	assert_int_equal(write(ends_of_module, "x", 1), 1);
 	for (;;)
 		pause();
+	return PSR_OK;
 }
 
 static int read_apart(struct cad_module_mesh **out, struct cad_module_report *report, cad_module_read *function,
