@@ -23,7 +23,7 @@ int settings_validate(const struct render_settings *settings, struct psr_error *
 		return psr_fail(err, PSR_ERR_ARG, "leaves cannot be discs and EWA splats at the same time");
 	if ((unsigned)settings->gap_method > PSR_GAPS_CLOSED)
 		return psr_fail(err, PSR_ERR_ARG, "unknown gap method %d", (int)settings->gap_method);
-	if (!(settings->spacing_px >= 1.0 / 64 && settings->spacing_px <= 64))
+	if (!(settings->spacing_px >= PSR_LEAST_SPACING && settings->spacing_px <= 64))
 		return psr_fail(err, PSR_ERR_ARG, "a spacing of %g is not within 1/64..64 pixels", settings->spacing_px);
 	if ((unsigned)settings->smooth > PSR_SMOOTH_FINE)
 		return psr_fail(err, PSR_ERR_ARG, "unknown smoothing %d", (int)settings->smooth);

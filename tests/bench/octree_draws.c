@@ -36,7 +36,6 @@
 #define TARGET_SURFACE 400
 #define TARGET_CLOUD 230
 #define TARGET_SPLATS 30
-#define LEAST_SPACING (1.0 / 64) /* of psr/render.h */
 
 static const double nearer[] = { 1, 0.5, 0.25 }; /* of the distance at which all fits the picture */
 #define N_DISTANCES 3
@@ -159,7 +158,7 @@ static int draw(struct times *times, const struct bench *bench, const struct sub
 	psr_settings_default(&settings, bench->side, bench->side);
 	settings.with_splats = subject->with_splats;
 	if (subject->is_whole)
-		settings.spacing_px = LEAST_SPACING;
+		settings.spacing_px = PSR_LEAST_SPACING;
 	rc = psr_render(bench->renderer, &scene, &settings, bench->pool, &frame, err);
 	if (rc != PSR_OK || times == NULL || times->n == MOST_FRAMES)
 		return rc;

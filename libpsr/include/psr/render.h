@@ -15,6 +15,7 @@ extern "C" {
 #endif
 
 #define PSR_MAX_PASS 4
+#define PSR_LEAST_SPACING (1.0 / 64) /* pixels */
 
 /* FINE: draws 2x2 sub-pixels a pixel, each as EDGES would draw it in a picture of twice the size, and gives each pixel
  * the mean of their light and the least of their depths. Takes five times as long, and draws colour and depth only. */
@@ -23,7 +24,7 @@ enum psr_smooth { PSR_SMOOTH_NONE = 0, PSR_SMOOTH_EDGES = 1, PSR_SMOOTH_FINE = 2
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
 	/* The greatest distance between neighbouring samples, in pixels: the renderer draws the coarsest level that
-	 * keeps it, or else the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
+	 * keeps it, or else the finest. PSR_LEAST_SPACING..64; 1 by default, [G]'s adequate sampling. */
 	double spacing_px;
 	/* EDGES: anti-aliasing in one pass ([G] 9.1.1), for a third of the frame's time. Blends a pixel at an edge with the
 	 * surface behind it, by how many of its eight neighbours belong to the near surface, and any other pixel with

@@ -14,7 +14,6 @@
 #define TRIALS 9    /* frames of each view and model, in turn; the least time counts: other work only adds to it */
 #define DISTANCE 4  /* of the eye, in radii */
 #define MARGIN 1.05
-#define LEAST_SPACING (1.0 / 64) /* of psr/render.h */
 
 static const double directions[OCTREE_VIEWS][3] = { { 0.5, 0.4, 1 }, { -0.9, 0.7, 0.6 }, { 0.3, -0.35, -1 } };
 
@@ -70,7 +69,7 @@ static int draw_way(const struct comparison *c, int i, struct stage *stage, stru
 	render_settings_default(&settings, OCTREE_SIDE, OCTREE_SIDE);
 	settings.with_ewa = c->way[i].with_splats;
 	if (c->way[i].is_whole)
-		settings.spacing_px = LEAST_SPACING;
+		settings.spacing_px = PSR_LEAST_SPACING;
 	stage->instance.model = c->way[i].model;
 	return renderer_draw(c->study->renderer, &stage->scene, &settings, c->study->pool, frame, c->study->err);
 }
