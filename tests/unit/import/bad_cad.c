@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
-#include <unistd.h>
 #include "base/infile.h"
 #include "base/random.h"
 #include "import/import.h"
@@ -256,10 +255,6 @@ int main(void)
 		cmocka_unit_test(iges_with_more_parts_than_parameters_is_told),
 		cmocka_unit_test(no_entity_ends_more_than_its_file),
 	};
-	const char *build = getenv("BUILD");
-	char module[600];
-
-	snprintf(module, sizeof module, "%s/lib/psr-cad-occ.so", build != NULL ? build : ".");
-	has_module = access(module, R_OK) == 0;
+	has_module = has_cad_module();
 	return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -16,7 +16,7 @@
 #include "import/import.h"
 #include "files.h"
 
-static int has_module; /* a build without Open CASCADE has none */
+static int has_module;
 
 static struct psr_mesh *read_pins(const char *path, uint32_t resolution)
 {
@@ -375,10 +375,6 @@ int main(void)
 		cmocka_unit_test(other_contents_are_told),
 	};
 
-	const char *build = getenv("BUILD");
-	char module[600];
-
-	snprintf(module, sizeof module, "%s/lib/psr-cad-occ.so", build != NULL ? build : ".");
-	has_module = access(module, R_OK) == 0;
+	has_module = has_cad_module();
 	return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -37,6 +37,16 @@ static inline int remove_folder(void **state)
 	return nftw(test_root, remove_one, 16, FTW_DEPTH | FTW_PHYS);
 }
 
+/* A build without Open CASCADE has none. */
+static inline int has_cad_module(void)
+{
+	const char *build = getenv("BUILD");
+	char module[600];
+
+	snprintf(module, sizeof module, "%s/lib/psr-cad-occ.so", build != NULL ? build : ".");
+	return access(module, R_OK) == 0;
+}
+
 /* The path of a file in the folder; valid until the next call but three. */
 static inline const char *path_of(const char *name)
 {
