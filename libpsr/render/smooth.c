@@ -81,6 +81,5 @@ int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct 
 		smoothing.target.offset = ldexpf(step, plan->exponent);
 	}
 	atomic_store(&smooth->n_edges, 0);
-	const int n_rows = (int)((plan->height + PART_HEIGHT - 1) / PART_HEIGHT);
-	return psr_pool_for_until(pool, &plan->cancel, n_rows, smooth_row, &smoothing);
+	return psr_pool_for_until(pool, &plan->cancel, (int)plan->parts_y, smooth_row, &smoothing);
 }

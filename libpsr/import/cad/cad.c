@@ -40,8 +40,7 @@ static int is_step(const char *path, const uint8_t *bytes, size_t n_bytes)
 
 static int is_iges(const char *path, const uint8_t *bytes, size_t n_bytes)
 {
-	return is_iges_ending(path) ||
-	       import_iges_is(bytes, n_bytes);
+	return is_iges_ending(path) || import_iges_is(bytes, n_bytes);
 }
 
 int import_cad_is(const char *path, const uint8_t *bytes, size_t n_bytes)

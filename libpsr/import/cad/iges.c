@@ -90,8 +90,7 @@ static int check_entity(const struct import_mesh *im, const struct entity *e, st
 			return psr_fail(err, PSR_ERR_FORMAT,
 			                "%s: entity D%.*s of the IGES file, of type %d, tells %llu parts by its parameter %d, and has "
 			                "%u parameters; export it again", im->path, (int)sizeof e->number - blank,
-			                e->number + blank, (int)l->type,
-			                (unsigned long long)parts, l->first, e->n);
+			                e->number + blank, (int)l->type, (unsigned long long)parts, l->first, e->n);
 	}
 	return PSR_OK;
 }
