@@ -1,4 +1,5 @@
 #include "points_spread.h"
+#define SMOOTH_RUN 16
 #include "simd/loops/table.h"
 
 #define BY_HAND(kernel) kernel##_avx512

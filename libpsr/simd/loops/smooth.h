@@ -163,9 +163,8 @@ static inline void smooth_samples(int32_t (*restrict code)[SMOOTH_WIDTH], size_t
 		find_shares_around(&shares, weights, x + k, &all);
 		for (int c = 0; c < 3; c++) {
 			const float *a = row[-1]->light[c] + i, *o = row[0]->light[c] + i, *b = row[1]->light[c] + i;
-			const float mean = 4 * o[0] + ((a[0] + b[0]) + (o[-1] + o[1]));
 
-			code[c][x + k] = smooth_code(add_shares(a, o, b, &shares, mean) * (1 / 8.0f));
+			code[c][x + k] = smooth_code(add_shares(a, o, b, &shares));
 		}
 	}
 }
@@ -243,7 +242,7 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 		const int32_t corners = behind.corner[0] + behind.corner[1] + behind.corner[2] + behind.corner[3];
 		const int32_t others = 4 + (same.above + same.below + same.left + same.right);
 		const int32_t edges = -(2 * sides + corners), through = edges < MOST_BEHIND ? edges : MOST_BEHIND;
-		const float share = (float)(8 - through) * (1 / 64.0f);
+		const float share = (float)(8 - through) * (1 / 8.0f);
 		const float rest = (float)through / (float)(8 * (edges ? edges : 1));
 
 		struct smooth_shares shares;
@@ -252,8 +251,12 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 			find_shares_around(&shares, weights, x + k, &same);
 		for (int c = 0; c < 3; c++) {
 			const float *a = up->light[c] + i, *o = own->light[c] + i, *b = down->light[c] + i;
-			const float mean = (float)(4 + others) * o[0] + add_sides(a, o, b, &same);
-			const float front = weights != NULL ? add_shares(a, o, b, &shares, mean) : mean;
+			float front;
+
+			if (weights != NULL)
+				front = add_shares(a, o, b, &shares);
+			else
+				front = ((float)(4 + others) * o[0] + add_sides(a, o, b, &same)) * (1 / 8.0f);
 			const float back = 2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind);
 
 			code[c][x + k] = smooth_code(front * share + back * rest);

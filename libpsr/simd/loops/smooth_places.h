@@ -8,8 +8,13 @@
 #include "simd/gaps.h"
 #include "simd/smooth.h"
 
-#define SMOOTH_RUN 16 /* pixels together: the fewer, the more runs are of one surface */
-#define SMOOTH_MEAN 256.0f /* of 128^2: what the mean of a surface's pixels weighs beside its samples */
+/* Pixels together, a vector of floats: the fewer, the more runs are of one surface. */
+#ifndef SMOOTH_RUN
+#define SMOOTH_RUN 8
+#endif
+/* What the mean of a surface's pixels, half of them its own, weighs beside its samples: 256 of 128^2. */
+#define SMOOTH_MEAN_OWN 128.0f
+#define SMOOTH_MEAN_SIDE 32.0f
 
 /* Masks of the neighbours that count. */
 struct smooth_masks {
@@ -59,16 +64,21 @@ static void weigh_nothing(struct smooth_weights *w, size_t first)
 	}
 }
 
-_Static_assert(SMOOTH_RUN == 16 && PSR_PLACE_NONE == 16, "as the next two have");
+_Static_assert(SMOOTH_RUN % 8 == 0 && PSR_PLACE_NONE == 16, "as the next two have");
 
 /* Whether any of a run's places, each at most PSR_PLACE_NONE, is one. */
 static inline int has_place(const uint8_t *place)
 {
 	const uint64_t none = UINT64_C(0x1010101010101010);
-	uint64_t some[2];
+	uint64_t all = none;
 
-	memcpy(some, place, sizeof some);
-	return (some[0] & some[1]) != none;
+	for (size_t i = 0; i < SMOOTH_RUN; i += 8) {
+		uint64_t some;
+
+		memcpy(&some, place + i, sizeof some);
+		all &= some;
+	}
+	return all != none;
 }
 
 static inline int has_place_of_two(const uint8_t *place)
@@ -98,9 +108,9 @@ static void load_weights(struct smooth_weights *w, const struct smooth_target *t
 	}
 }
 
-/* The weights of the samples in a pixel and around it, by row, and what to multiply eighths of all with. */
+/* What a pixel and those around it weigh, by row: their samples, and their parts of the mean. */
 struct smooth_shares {
-	float row[3][3], whole;
+	float row[3][3], whole; /* 1 / the sum of all */
 };
 
 static inline float weight_of(const struct smooth_weights *w, int j, int i, size_t x)
@@ -108,33 +118,35 @@ static inline float weight_of(const struct smooth_weights *w, int j, int i, size
 	return w->across[1 - i][x + (size_t)(1 + i)] * w->down[1 - j][x + (size_t)(1 + i)];
 }
 
-/* Of pixel x; `w` points to the three rows around it. */
+/* Of pixel x; `w` points to the three rows around it. The part of a side that does not count is the pixel's. */
 static inline void find_shares_around(struct smooth_shares *s, const struct smooth_weights *const *w, size_t x,
                                       const struct smooth_masks *m)
 {
-	const int32_t above[3] = { m->corner[0], m->above, m->corner[1] }, beside[3] = { m->left, -1, m->right };
-	const int32_t below[3] = { m->corner[2], m->below, m->corner[3] };
+	const float side = SMOOTH_MEAN_SIDE;
+	const float others = (float)(4 + (m->above + m->below + m->left + m->right));
 	float all = 0;
 
-	for (int i = -1; i <= 1; i++) {
-		s->row[0][1 + i] = masked(weight_of(w[0], -1, i, x), above[1 + i]);
-		s->row[1][1 + i] = masked(weight_of(w[1], 0, i, x), beside[1 + i]);
-		s->row[2][1 + i] = masked(weight_of(w[2], 1, i, x), below[1 + i]);
+	for (int i = 0; i < 2; i++) {
+		s->row[0][2 * i] = masked(weight_of(w[0], -1, 2 * i - 1, x), m->corner[i]);
+		s->row[2][2 * i] = masked(weight_of(w[2], 1, 2 * i - 1, x), m->corner[2 + i]);
 	}
+	s->row[0][1] = masked(weight_of(w[0], -1, 0, x) + side, m->above);
+	s->row[1][0] = masked(weight_of(w[1], 0, -1, x) + side, m->left);
+	s->row[1][1] = weight_of(w[1], 0, 0, x) + (SMOOTH_MEAN_OWN + side * others);
+	s->row[1][2] = masked(weight_of(w[1], 0, 1, x) + side, m->right);
+	s->row[2][1] = masked(weight_of(w[2], 1, 0, x) + side, m->below);
 	for (int j = 0; j < 3; j++)
 		all += (s->row[j][0] + s->row[j][1]) + s->row[j][2];
-	s->whole = 8 / (all + SMOOTH_MEAN);
+	s->whole = 1 / all;
 }
 
-/* Eight times the light of samples, and of the mean of which `mean` is eight times as much. */
-static inline float add_shares(const float *a, const float *o, const float *b, const struct smooth_shares *s,
-                               float mean)
+static inline float add_shares(const float *a, const float *o, const float *b, const struct smooth_shares *s)
 {
 	const float above = (a[-1] * s->row[0][0] + a[0] * s->row[0][1]) + a[1] * s->row[0][2];
 	const float beside = (o[-1] * s->row[1][0] + o[0] * s->row[1][1]) + o[1] * s->row[1][2];
 	const float below = (b[-1] * s->row[2][0] + b[0] * s->row[2][1]) + b[1] * s->row[2][2];
 
-	return (((above + beside) + below) + mean * (SMOOTH_MEAN / 8)) * s->whole;
+	return ((above + beside) + below) * s->whole;
 }
 
 static inline void place_run(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
