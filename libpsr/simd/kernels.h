@@ -11,7 +11,7 @@ warp_fn ewa_sums_c, ewa_sums_avx2, ewa_sums_avx512;
 warp_fn warp_points_avx512;
 veil_fn veil_c, veil_avx2, veil_avx512;
 reproject_look_fn reproject_look_avx2;
-strip_list_fn strip_list_avx512;
+strip_list_fn strip_list_avx2, strip_list_avx512;
 strip_read_fn strip_read_avx512;
 strip_write_fn strip_write_avx512;
 fill_pull_weights_fn fill_pull_weights_avx512;

@@ -2,5 +2,6 @@
 #include "simd/loops/table.h"
 
 #define AS_LOOPS(kernel) kernel
+#define BY_HAND(kernel) kernel##_avx2
 
-const struct simd simd_avx2 = SIMD_TABLE(avx2, reproject_look_avx2, AS_LOOPS);
+const struct simd simd_avx2 = SIMD_TABLE(avx2, reproject_look_avx2, BY_HAND, AS_LOOPS);

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "simd/kernels.h"
 #include "simd/veil_list.h"
+#include "front.h"
 
 /* Values that do not fit, and NaN, become INT32_MIN, outside of every picture. */
 static inline __m256i floor_int(__m256 u)
@@ -63,15 +64,6 @@ static inline uint32_t bits_of(__m256i k)
 	return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(k));
 }
 
-/* The order that brings the lanes of a mask to the front. */
-static inline __m256i front_of(uint32_t bits)
-{
-	const uint64_t lanes =
-		_pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
-
-	return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)lanes));
-}
-
 static inline void store(void *to, __m256i value)
 {
 	_mm256_storeu_si256(to, value);
@@ -121,9 +113,7 @@ static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 
 	for (uint64_t row = 0; row < 8; row++) {
 		const uint64_t bits = mask >> 8 * row & 0xff;
-		const uint64_t columns =
-			_pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
-		const uint64_t numbers = columns + row * UINT64_C(0x0808080808080808);
+		const uint64_t numbers = front_lanes((uint32_t)bits) + row * UINT64_C(0x0808080808080808);
 
 		memcpy(sample + n, &numbers, sizeof numbers);
 		n += (uint32_t)__builtin_popcountll(bits);
