@@ -2,7 +2,7 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "simd/kernels.h"
-#include "simd/loops/strip_parts.h"
+#include "simd/loops/strip_write.h"
 #include "front.h"
 
 #define AHEAD (2 * STRIP) /* words: prefetch the strip after the next */
@@ -64,4 +64,50 @@ void strip_list_avx2(struct strip_pixels *p, const uint64_t *word, const uint16_
 	}
 	p->n = n;
 	p->word = word;
+}
+
+/* Eight pixels without their fourth bytes. */
+static inline void store_eight(uint8_t *to, __m256i pixels)
+{
+	const __m256i first_three = _mm256_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1, 0, 1, 2, 4, 5, 6,
+	                                             8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
+	const __m256i halves = _mm256_shuffle_epi8(pixels, first_three);
+	const __m256i bytes = _mm256_permutevar8x32_epi32(halves, _mm256_setr_epi32(0, 1, 2, 4, 5, 6, 3, 7));
+
+	_mm_storeu_si128((__m128i *)to, _mm256_castsi256_si128(bytes));
+	_mm_storel_epi64((__m128i *)(to + 16), _mm256_extracti128_si256(bytes, 1));
+}
+
+/* Scalar look-ups are faster than gathers. */
+static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const struct strip_pixels *p = strip->pixels;
+	const uint16_t *dark = target->background;
+	const __m256i empty = _mm256_set1_epi32((int)pixel_of(target->srgb, dark[0], dark[1], dark[2]));
+	uint32_t pixel[STRIP + 8], n_written = 0;
+
+	for (uint32_t i = 0; i < p->n; i++)
+		pixel[i] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
+	for (uint32_t x = 0; x < n; x += 8) {
+		const uint32_t k = p->has_sample[x / 32] >> x % 32 & 0xff;
+		const __m256i samples = _mm256_loadu_si256((const __m256i *)(pixel + n_written));
+		const __m256i apart = _mm256_permutevar8x32_epi32(samples, back_of(k));
+		const __m256i pixels = _mm256_blendv_epi8(empty, apart, lanes_of(k));
+		uint8_t rest[24];
+
+		store_eight(n - x < 8 ? rest : to + 3 * x, pixels);
+		if (n - x < 8)
+			memcpy(to + 3 * x, rest, 3 * (size_t)(n - x));
+		n_written += (uint32_t)__builtin_popcount(k);
+	}
+}
+
+void strip_write_avx2(const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const struct strip_pixels *p = strip->pixels;
+
+	if (target->rgb != NULL)
+		write_rgb(target->rgb + 3 * ((size_t)p->y * target->width + p->x0), strip, target, n);
+	if (target->wants != NULL)
+		write_linear(strip, target, n);
 }

@@ -47,7 +47,7 @@ static inline void strip_write(const struct strip *strip, const struct strip_tar
 		write_linear(strip, target, n);
 }
 
-static void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
+static inline void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
 {
 	float factor[2];
 

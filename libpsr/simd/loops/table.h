@@ -1,6 +1,6 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
  * instructions. Arguments: the name of the set, the kernel of reproject_look, and two macros that name a kernel's variant
- * where one is written by hand: of listing strips, and of others. */
+ * where one is written by hand: of strips' pixels, listed and written, and of others. */
 #include "average.h"
 #include "cull.h"
 #include "discs.h"
@@ -19,7 +19,7 @@
 #include "strip.h"
 #include "zbuffer.h"
 
-#define SIMD_TABLE(isa, look_kernel, LIST, KERNEL) { \
+#define SIMD_TABLE(isa, look_kernel, PIXELS, KERNEL) { \
 	.cull = cull,                                  \
 	.cull_cones = cull_cones,                      \
 	.warp_far = warp_far,                          \
@@ -34,7 +34,7 @@
 	.discs_of_block = discs_of_block,              \
 	.discs_place = discs_place,                    \
 	.discs_draw = discs_draw,                      \
-	.strip_list = LIST(strip_list),                \
+	.strip_list = PIXELS(strip_list),              \
 	.strip_find = strip_find,                      \
 	.strip_read = KERNEL(strip_read),              \
 	.strip_resolve = strip_resolve,                \
@@ -43,7 +43,7 @@
 	.strip_light = strip_light,                    \
 	.strip_lit = strip_lit,                        \
 	.strip_color = strip_color,                    \
-	.strip_write = KERNEL(strip_write),            \
+	.strip_write = PIXELS(strip_write),            \
 	.depth_row = depth_row,                        \
 	.gaps = gaps,                                  \
 	.holes = holes,                                \
