@@ -14,6 +14,7 @@ reproject_look_fn reproject_look_avx2;
 strip_list_fn strip_list_avx2, strip_list_avx512;
 strip_read_fn strip_read_avx512;
 strip_write_fn strip_write_avx2, strip_write_avx512;
+smooth_places_fn smooth_places_avx2;
 fill_pull_weights_fn fill_pull_weights_avx512;
 fill_pull_colors_fn fill_pull_colors_avx512;
 fill_push_fn fill_push_avx512;

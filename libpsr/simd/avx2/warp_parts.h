@@ -6,7 +6,7 @@
 #include <string.h>
 #include "simd/kernels.h"
 #include "simd/veil_list.h"
-#include "front.h"
+#include "lanes.h"
 
 /* Values that do not fit, and NaN, become INT32_MIN, outside of every picture. */
 static inline __m256i floor_int(__m256 u)

@@ -4,4 +4,4 @@
 
 #define BY_HAND(kernel) kernel##_avx512
 
-const struct simd simd_avx512 = SIMD_TABLE(avx512, reproject_look_avx2, BY_HAND, BY_HAND);
+const struct simd simd_avx512 = SIMD_TABLE(avx512, reproject_look_avx2, smooth_places, BY_HAND, BY_HAND);

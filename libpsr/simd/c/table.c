@@ -2,4 +2,4 @@
 
 #define AS_LOOPS(kernel) kernel
 
-const struct simd simd_c = SIMD_TABLE(c, reproject_look, AS_LOOPS, AS_LOOPS);
+const struct simd simd_c = SIMD_TABLE(c, reproject_look, smooth_places, AS_LOOPS, AS_LOOPS);

@@ -165,7 +165,7 @@ static inline void place_run(uint8_t *restrict place, const uint64_t *word, cons
 	}
 }
 
-static void smooth_places(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
+static inline void smooth_places(uint8_t *restrict place, const uint64_t *word, const uint16_t *weight, uint32_t n)
 {
 	const uint32_t whole = n / SMOOTH_RUN * SMOOTH_RUN;
 

@@ -1,6 +1,6 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
- * instructions. Arguments: the name of the set, the kernel of reproject_look, and two macros that name a kernel's variant
- * where one is written by hand: of strips' pixels, listed and written, and of others. */
+ * instructions. Arguments: the name of the set, the kernels of reproject_look and smooth_places, and two macros that name
+ * a kernel's variant where one is written by hand: of strips' pixels, listed and written, and of others. */
 #include "average.h"
 #include "cull.h"
 #include "discs.h"
@@ -19,7 +19,7 @@
 #include "strip.h"
 #include "zbuffer.h"
 
-#define SIMD_TABLE(isa, look_kernel, PIXELS, KERNEL) { \
+#define SIMD_TABLE(isa, look_kernel, places_kernel, PIXELS, KERNEL) { \
 	.cull = cull,                                  \
 	.cull_cones = cull_cones,                      \
 	.warp_far = warp_far,                          \
@@ -56,7 +56,7 @@
 	.fill_pick = fill_pick,                        \
 	.fill_own = fill_own,                          \
 	.fill_depths = fill_depths,                    \
-	.smooth_places = smooth_places,                \
+	.smooth_places = places_kernel,                \
 	.smooth = smooth,                              \
 	.average_light = average_light,                \
 	.average_around = average_around,              \
