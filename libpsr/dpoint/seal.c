@@ -10,19 +10,20 @@
 
 #define CHUNK 512 /* cells */
 #define AROUND 8  /* directions of a slant */
+#define AROUND_GRAZING (2 * AROUND) /* odd ones are those of a slant */
 #define PLACES 9  /* of a cell: corners, middles of sides, the middle */
 #define INWARDS 0.9f
 #define GRAZED 2.5f /* of `behind`, for grazing rays: they get as much further before they are as deep */
 #define BEHIND 6  /* of options->height: three samples of a mesh's resolution ([G] 7.2) */
 
 #define STEEP (1 + 2 * AROUND) /* rays to any cell; more graze cells of two sides */
-#define DIRECTIONS (STEEP + AROUND)
+#define DIRECTIONS (STEEP + AROUND_GRAZING)
 
-#define GRAZING 0.08f
+#define GRAZING 0.07f
 
-/* Cosines of rays to the cell's normal. The last ones, 85.4 degrees off, are to cells of two sides alone: who looks into
- * what is hollow and open sees its walls aslant as far as they go. */
-static const float slant[3] = { 0.65f, LID_LEAST_COSINE, GRAZING };
+/* Cosines of rays to the cell's normal. More rays, 86 degrees off and from between those directions as well, are to
+ * cells of two sides alone: who looks into what is hollow and open sees its walls aslant as far as they go. */
+static const float slant[2] = { 0.65f, LID_LEAST_COSINE };
 
 struct sealing {
 	const struct dpoint_surface *surface;
@@ -31,7 +32,7 @@ struct sealing {
 	uint32_t *over;        /* by cell: a lid that covers it, or UINT32_MAX; NULL: not known */
 	struct cell_tree tree; /* of the lids' corners */
 	uint8_t *is_open;      /* by cell */
-	float around[AROUND][2], behind;
+	float around[AROUND_GRAZING][2], behind;
 	int is_failed;
 };
 
@@ -121,12 +122,13 @@ static int directions(float (*from)[3], const struct sealing *s, const struct dp
 		v3f_scale(normal, normal, -1);
 	dpoint_tangents(x, y, normal);
 	memcpy(from[0], normal, sizeof from[0]);
-	for (int d = 0; d < 3 * AROUND; d++) {
-		const float cosine = slant[d / AROUND], sine = sqrtf(1 - cosine * cosine), *turn = s->around[d % AROUND];
+	for (int d = 1; d < DIRECTIONS; d++) {
+		const float cosine = d >= STEEP ? GRAZING : slant[(d - 1) / AROUND], sine = sqrtf(1 - cosine * cosine);
+		const float *turn = s->around[d >= STEEP ? d - STEEP : 2 * ((d - 1) % AROUND) + 1];
 
-		v3f_scale(from[1 + d], normal, cosine);
-		v3f_add_scaled(from[1 + d], from[1 + d], sine * turn[0], x);
-		v3f_add_scaled(from[1 + d], from[1 + d], sine * turn[1], y);
+		v3f_scale(from[d], normal, cosine);
+		v3f_add_scaled(from[d], from[d], sine * turn[0], x);
+		v3f_add_scaled(from[d], from[d], sine * turn[1], y);
 	}
 	return 1;
 }
@@ -301,10 +303,10 @@ static int keep_planes(struct dpoint_choice *choice, size_t before, size_t n)
 
 static void set_around(struct sealing *s)
 {
-	for (int d = 0; d < AROUND; d++) {
+	for (int d = 0; d < AROUND_GRAZING; d++) {
 		double sine, cosine;
 
-		psr_sincos((d + 0.5) * (2 * 3.14159265358979 / AROUND), &sine, &cosine);
+		psr_sincos(d * (2 * 3.14159265358979 / AROUND_GRAZING), &sine, &cosine);
 		s->around[d][0] = (float)cosine;
 		s->around[d][1] = (float)sine;
 	}
