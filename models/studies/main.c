@@ -14,7 +14,7 @@
 
 static const struct study_kind *find_kind(const char *name, int *is_figure, struct psr_error *err)
 {
-	char names[512] = "";
+	char names[PSR_ERROR_TEXT] = "";
 	size_t used = 0;
 
 	for (size_t i = 0; i < n_study_tables + n_study_figures; i++) {
@@ -23,7 +23,8 @@ static const struct study_kind *find_kind(const char *name, int *is_figure, stru
 		*is_figure = i >= n_study_tables;
 		if (strcmp(kind->name, name) == 0)
 			return kind;
-		used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i == 0 ? "" : ", ", kind->name);
+		if (used < sizeof names) /* the error holds no more of them */
+			used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i == 0 ? "" : ", ", kind->name);
 	}
 	psr_fail(err, PSR_ERR_ARG, "there is no study '%.64s'; there are: %s", name, names);
 	return NULL;

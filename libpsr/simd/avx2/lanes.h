@@ -3,6 +3,7 @@
 #define PSR_SIMD_AVX2_LANES_H
 
 #include <immintrin.h>
+#include <stddef.h>
 #include <stdint.h>
 #include "simd/zstack.h"
 
@@ -19,7 +20,6 @@ static inline uint64_t front_lanes(uint32_t bits)
 }
 
 /* The order that brings the lanes of the mask to the front. */
-
 static inline __m256i front_of(uint32_t bits)
 {
 	return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)front_lanes(bits)));
@@ -48,6 +48,23 @@ static inline struct eight_words load_eight(const uint64_t *word)
 {
 	return (struct eight_words){ _mm256_loadu_si256((const __m256i *)word),
 		                         _mm256_loadu_si256((const __m256i *)(word + 4)) };
+}
+
+/* The last words of a row, fewer than eight, and their weights, or 1 each if `weight` is NULL; then empty ones. */
+struct last_words {
+	uint64_t word[8];
+	uint16_t weight[8];
+};
+
+static inline struct last_words last_of(const uint64_t *word, const uint16_t *weight, uint32_t n)
+{
+	struct last_words last;
+
+	for (uint32_t i = 0; i < 8; i++) {
+		last.word[i] = i < n ? word[i] : PSR_WORD_EMPTY;
+		last.weight[i] = i < n && weight != NULL ? weight[i] : 1;
+	}
+	return last;
 }
 
 /* The low 32 bits of eight lanes of 64. */

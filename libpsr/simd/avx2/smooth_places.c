@@ -1,5 +1,6 @@
-#include "simd/kernels.h"
+#include <string.h>
 #include "simd/gaps.h"
+#include "simd/kernels.h"
 #include "lanes.h"
 
 static inline void place_eight(uint8_t *to, const uint64_t *word, const uint16_t *weight)
@@ -17,20 +18,15 @@ static inline void place_eight(uint8_t *to, const uint64_t *word, const uint16_t
 
 void smooth_places_avx2(uint8_t *place, const uint64_t *word, const uint16_t *weight, uint32_t n)
 {
-	uint64_t rest[8];
-	uint16_t rest_weight[8];
-	uint8_t rest_place[8];
 	uint32_t x = 0;
 
 	for (; x + 8 <= n; x += 8)
 		place_eight(place + x, word + x, weight + x);
-	if (x == n)
-		return;
-	for (uint32_t i = 0; i < 8; i++) {
-		rest[i] = x + i < n ? word[x + i] : PSR_WORD_EMPTY;
-		rest_weight[i] = x + i < n ? weight[x + i] : 0;
+	if (x < n) {
+		const struct last_words last = last_of(word + x, weight + x, n - x);
+		uint8_t some[8];
+
+		place_eight(some, last.word, last.weight);
+		memcpy(place + x, some, n - x);
 	}
-	place_eight(rest_place, rest, rest_weight);
-	for (uint32_t i = 0; x + i < n; i++)
-		place[x + i] = rest_place[i];
 }

@@ -44,16 +44,8 @@ void strip_list_avx2(struct strip_pixels *p, const uint64_t *word, const uint16_
 		n += (uint32_t)__builtin_popcount(k);
 	}
 	if (first < n_pixels) {
-		uint64_t rest[8];
-		uint16_t rest_weight[8];
-
-		for (uint32_t i = 0; i < 8; i++) {
-			const int is_there = first + i < n_pixels;
-
-			rest[i] = is_there ? word[first + i] : PSR_WORD_EMPTY;
-			rest_weight[i] = is_there && weight != NULL ? weight[first + i] : 1;
-		}
-		const uint32_t k = list_eight(p, n, rest, rest_weight, first, place_bits);
+		const struct last_words last = last_of(word + first, weight != NULL ? weight + first : NULL, n_pixels - first);
+		const uint32_t k = list_eight(p, n, last.word, last.weight, first, place_bits);
 
 		p->has_sample[first / 32] |= k << first % 32;
 		n += (uint32_t)__builtin_popcount(k);
