@@ -7,7 +7,8 @@
 
 #define AHEAD (2 * STRIP) /* words: prefetch the strip after the next */
 
-/* Lists those of eight pixels from p->x0 + first on that have a sample, and returns their mask. */
+/* Lists those of eight pixels from p->x0 + first on that have a sample, behind n others. Returns how many there are
+ * then. */
 static inline uint32_t list_eight(struct strip_pixels *p, uint32_t n, const uint64_t *word, const uint16_t *weight,
                                   uint32_t first, unsigned place_bits)
 {
@@ -27,7 +28,8 @@ static inline uint32_t list_eight(struct strip_pixels *p, uint32_t n, const uint
 
 	_mm256_storeu_si256((__m256i *)(p->id + n), _mm256_permutevar8x32_epi32(id, _mm256_cvtepu8_epi32(front)));
 	_mm_storeu_si128((__m128i *)(p->x + n), _mm_add_epi16(_mm_cvtepu8_epi16(front), _mm_set1_epi16((short)first)));
-	return k;
+	p->has_sample[first / 32] |= k << first % 32;
+	return n + (uint32_t)__builtin_popcount(k);
 }
 
 void strip_list_avx2(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels,
@@ -38,17 +40,12 @@ void strip_list_avx2(struct strip_pixels *p, const uint64_t *word, const uint16_
 	memset(p->has_sample, 0, sizeof p->has_sample);
 	for (; first + 8 <= n_pixels; first += 8) {
 		_mm_prefetch((const char *)(word + first + AHEAD), _MM_HINT_T0);
-		const uint32_t k = list_eight(p, n, word + first, weight != NULL ? weight + first : NULL, first, place_bits);
-
-		p->has_sample[first / 32] |= k << first % 32;
-		n += (uint32_t)__builtin_popcount(k);
+		n = list_eight(p, n, word + first, weight != NULL ? weight + first : NULL, first, place_bits);
 	}
 	if (first < n_pixels) {
 		const struct last_words last = last_of(word + first, weight != NULL ? weight + first : NULL, n_pixels - first);
-		const uint32_t k = list_eight(p, n, last.word, last.weight, first, place_bits);
 
-		p->has_sample[first / 32] |= k << first % 32;
-		n += (uint32_t)__builtin_popcount(k);
+		n = list_eight(p, n, last.word, last.weight, first, place_bits);
 	}
 	p->n = n;
 	p->word = word;
