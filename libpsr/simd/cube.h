@@ -13,6 +13,7 @@ struct warp_cube {
 	const uint16_t *normal; /* of its leaves, and their offsets; NULL: none, and the cube is not mixed */
 	const uint8_t *offset;
 	const uint8_t (*color)[3]; /* NULL: gray */
+	uint64_t n_ahead;          /* leaves of the tree from its first one on: vectors may read those of later cubes */
 	uint64_t mask;
 	uint32_t id;
 };
@@ -52,6 +53,7 @@ static inline void warp_cube_make(struct warp_cube *out, const struct warp_insta
 	out->normal = tree->normal != NULL ? tree->normal + leaf : NULL;
 	out->offset = tree->offset != NULL && tree->normal != NULL ? tree->offset + leaf : NULL;
 	out->color = tree->color != NULL ? (const uint8_t(*)[3])tree->color + leaf : NULL;
+	out->n_ahead = tree->n_leaves - leaf;
 	out->mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
 	out->id = slot * PSR_BLOCK_SAMPLES;
 }

@@ -23,9 +23,9 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 		__m256 offset = _mm256_setzero_ps();
 
 		if (cube->normal != NULL)
-			components_of(normal, tens_of(t, normals_of(cube->normal + i, (int)(n - i))));
+			components_of(normal, tens_of(t, normals_of(cube->normal + i, cube->n_ahead - i)));
 		if (cube->offset != NULL)
-			offset = offsets_of(cube->offset + i, (int)(n - i));
+			offset = offsets_of(cube->offset + i, cube->n_ahead - i);
 		for (int a = 0; a < 3; a++) {
 			const __m256 middle = axis_of(rows[a], octants->col[a], octant, leaf);
 

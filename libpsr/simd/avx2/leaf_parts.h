@@ -30,21 +30,24 @@ static inline __m256 offset_axis(const struct warp_octants *octants, int a, cons
 	return _mm256_mul_ps(_mm256_add_ps(_mm256_add_ps(x, y), z), offset);
 }
 
-/* Normals of the next n or 8 leaves, and their offsets. */
-static inline __m256i normals_of(const uint16_t *normal, int n)
+/* Normals of the next 8 leaves, and their offsets; zeros where fewer, n_ahead, are left in the tree. */
+static inline __m256i normals_of(const uint16_t *normal, uint64_t n_ahead)
 {
 	uint16_t some[8] = { 0 };
 
-	if (n < 8)
-		memcpy(some, normal, (size_t)n * sizeof *some);
-	return _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(n < 8 ? some : normal)));
+	if (n_ahead < 8)
+		memcpy(some, normal, n_ahead * sizeof *some);
+	return _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(n_ahead < 8 ? some : normal)));
 }
 
-static inline __m256 offsets_of(const uint8_t *offset, int n)
+static inline __m256 offsets_of(const uint8_t *offset, uint64_t n_ahead)
 {
 	uint64_t some = 0;
 
-	memcpy(&some, offset, n < 8 ? (size_t)n : sizeof some);
+	if (n_ahead < 8)
+		memcpy(&some, offset, n_ahead);
+	else
+		memcpy(&some, offset, sizeof some);
 	const __m256i step = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)some));
 	return _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_add_epi32(step, step), _mm256_set1_epi32(WARP_OFFSET_MIDDLE)));
 }

@@ -22,9 +22,9 @@ static inline __attribute__((always_inline)) void list_cube(struct words *words,
 		__m256 z1 = axis_of(row_z, octants->col[2], octant, leaf), normal[3];
 
 		if (with_offsets || entry->is_mixed)
-			components_of(normal, tens_of(t, normals_of(cube->normal + 8 * g, n - 8 * g)));
+			components_of(normal, tens_of(t, normals_of(cube->normal + 8 * g, cube->n_ahead - 8 * (unsigned)g)));
 		if (with_offsets) {
-			const __m256 offset = offsets_of(cube->offset + 8 * g, n - 8 * g);
+			const __m256 offset = offsets_of(cube->offset + 8 * g, cube->n_ahead - 8 * (unsigned)g);
 
 			x1 = _mm256_add_ps(x1, offset_axis(octants, 0, normal, offset));
 			y1 = _mm256_add_ps(y1, offset_axis(octants, 1, normal, offset));
