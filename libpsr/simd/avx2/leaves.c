@@ -1,58 +1,135 @@
 /* The warp of leaves: two terms a place, as [B] (1), and where a leaf is wider than a pixel its offset. */
-#include "simd/leaves_list.h"
+#include "simd/leaves_batch.h"
 #include "leaf_parts.h"
 
-static inline __attribute__((always_inline)) void list_cube(struct words *words, struct cells *cells,
-                                                            const struct warp_target *t, const struct bin_entry *entry,
-                                                            const struct warp_cube *cube)
+#define LANES 8
+
+/* ---- leaves to words ---- */
+
+static inline __attribute__((always_inline)) void draw(struct leaves_lists *to, const struct leaves *l,
+                                                       const struct warp_target *t, uint32_t i, uint32_t n)
 {
 	const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-	const struct warp_instance *in = &t->instance[entry->instance];
-	const struct warp_octants *octants = cube->octants;
-	const int with_offsets = entry->is_wide && cube->offset != NULL;
-	const int n = __builtin_popcountll(cube->mask), n_groups = (n + 7) / 8;
-	const __m256 row_x = rows_of(cube, 0), row_y = rows_of(cube, 1), row_z = rows_of(cube, 2);
-	uint8_t lane[64 + 8];
+	__m256 x1 = _mm256_load_ps(l->at[0] + i), y1 = _mm256_load_ps(l->at[1] + i), z1 = _mm256_load_ps(l->at[2] + i);
+	__m256 normal[3];
 
-	list_samples(lane, cube->mask);
-	for (int g = 0; g < n_groups; g++) {
-		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(lane + 8 * g)));
-		const __m256i octant = _mm256_srli_epi32(s, 3), leaf = s; /* the low three bits count */
-		__m256 x1 = axis_of(row_x, octants->col[0], octant, leaf), y1 = axis_of(row_y, octants->col[1], octant, leaf);
-		__m256 z1 = axis_of(row_z, octants->col[2], octant, leaf), normal[3];
+	if (l->with_offsets | l->is_mixed)
+		components_of(normal, tens_of(t, _mm256_cvtepu16_epi32(_mm_load_si128((const __m128i *)(l->normal + i)))));
+	if (l->with_offsets) {
+		const __m256 offset = offsets_of(_mm_loadl_epi64((const __m128i *)(l->offset + i)));
 
-		if (with_offsets || entry->is_mixed)
-			components_of(normal, tens_of(t, normals_of(cube->normal + 8 * g, cube->n_ahead - 8 * (unsigned)g)));
-		if (with_offsets) {
-			const __m256 offset = offsets_of(cube->offset + 8 * g, cube->n_ahead - 8 * (unsigned)g);
+		x1 = _mm256_add_ps(x1, offset_axis(l->octants, 0, normal, offset));
+		y1 = _mm256_add_ps(y1, offset_axis(l->octants, 1, normal, offset));
+		z1 = _mm256_add_ps(z1, offset_axis(l->octants, 2, normal, offset));
+	}
+	const __m256 one = _mm256_set1_ps(1), inverse = t->perspective ? _mm256_div_ps(one, z1) : one;
+	const __m256 u = _mm256_mul_ps(x1, inverse), v = _mm256_mul_ps(y1, inverse);
+	const __m256i pixel_u = floor_int(u), pixel_v = floor_int(v);
+	__m256i k = _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ));
 
-			x1 = _mm256_add_ps(x1, offset_axis(octants, 0, normal, offset));
-			y1 = _mm256_add_ps(y1, offset_axis(octants, 1, normal, offset));
-			z1 = _mm256_add_ps(z1, offset_axis(octants, 2, normal, offset));
+	if (n < LANES)
+		k = _mm256_and_si256(k, _mm256_cmpgt_epi32(_mm256_set1_epi32((int)n), lanes));
+	if (l->is_mixed)
+		k = _mm256_andnot_si256(faces_away(l->in, normal, u, v), k);
+	if (l->level)
+		list_cells(&to->cells, t, k, pixel_u, pixel_v, z1);
+	k = _mm256_and_si256(k, _mm256_and_si256(within(pixel_u, t->x0, t->x1), within(pixel_v, t->y0, t->y1)));
+	const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
+	const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
+	const struct warped samples = {
+		_mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x),
+		_mm256_load_si256((const __m256i *)(l->id + i)), _mm256_castps_si256(z1), _mm256_setzero_si256(),
+	};
+	list_words(&to->words, NULL, k, &samples);
+}
+
+/* ---- cubes to leaves ---- */
+
+/* Doubles of integers below 2^52. */
+static inline __m256d doubles_of(__m256i a)
+{
+	const __m256i exponent = _mm256_set1_epi64x(0x4330000000000000);
+
+	return _mm256_sub_pd(_mm256_castsi256_pd(_mm256_or_si256(a, exponent)), _mm256_castsi256_pd(exponent));
+}
+
+static inline __m256i places_of(const struct psr_cube *cube, const uint8_t number[4])
+{
+	uint64_t place[4];
+
+	for (int i = 0; i < 4; i++)
+		memcpy(&place[i], cube[number[i]].place, sizeof place[i]);
+	return _mm256_loadu_si256((const __m256i *)place);
+}
+
+static inline void place(struct placed_cubes *placed, const struct warp_cubes *to, const struct run *run, uint64_t cubes)
+{
+	const __m256i most = _mm256_set1_epi64x((1 << CUBES_PLACE_BITS) - 1), two = _mm256_set1_epi64x(2);
+	const __m256d edge = _mm256_set1_pd(run->level->edge);
+	const uint32_t n = (uint32_t)__builtin_popcountll(cubes);
+
+	list_samples(placed->number, cubes);
+	memset(placed->number + n, placed->number[0], 3); /* there are cubes to the end of four */
+	for (uint32_t i = 0; i < n; i += 4) {
+		const __m256i own = places_of(run->cube, placed->number + i);
+		__m256d c[3];
+
+		for (int a = 0; a < 3; a++) {
+			const __m256i at = _mm256_and_si256(_mm256_srli_epi64(own, CUBES_PLACE_BITS * a), most);
+			const __m256d steps = doubles_of(_mm256_add_epi64(_mm256_slli_epi64(at, 2), two));
+
+			c[a] = _mm256_add_pd(_mm256_set1_pd(run->level->tree->low[a]), _mm256_mul_pd(steps, edge));
 		}
-		const __m256 one = _mm256_set1_ps(1), inverse = t->perspective ? _mm256_div_ps(one, z1) : one;
-		const __m256 u = _mm256_mul_ps(x1, inverse), v = _mm256_mul_ps(y1, inverse);
-		const __m256i pixel_u = floor_int(u), pixel_v = floor_int(v);
-		const __m256i valid = _mm256_cmpgt_epi32(_mm256_set1_epi32(n - 8 * g), lanes);
-		__m256i k =
-			_mm256_and_si256(valid, _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ)));
+		for (int a = 0; a < 3; a++) {
+			const double *axis = to->axis[a];
+			const __m256d x = _mm256_mul_pd(_mm256_set1_pd(axis[0]), c[0]);
+			const __m256d y = _mm256_mul_pd(_mm256_set1_pd(axis[1]), c[1]);
+			const __m256d z = _mm256_mul_pd(_mm256_set1_pd(axis[2]), c[2]);
+			const __m256d sum = _mm256_add_pd(_mm256_add_pd(x, y), z);
 
-		if (entry->is_mixed)
-			k = _mm256_andnot_si256(faces_away(in, normal, u, v), k);
-		if (entry->level)
-			list_cells(cells, t, k, pixel_u, pixel_v, z1);
-		k = _mm256_and_si256(k, _mm256_and_si256(within(pixel_u, t->x0, t->x1), within(pixel_v, t->y0, t->y1)));
-		const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
-		const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
-		const struct warped samples = {
-			_mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x),
-			_mm256_add_epi32(s, _mm256_set1_epi32((int)cube->id)), _mm256_castps_si256(z1), _mm256_setzero_si256()
-		};
-		list_words(words, NULL, k, &samples);
+			_mm256_store_pd(placed->middle[a] + i, _mm256_add_pd(_mm256_set1_pd(to->origin[a]), sum));
+		}
 	}
 }
 
+static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which)
+{
+	const struct octree *tree = run->level->tree;
+	const uint32_t number = placed->number[which];
+	const uint32_t code = run->from.code + run->cube[number].code, leaf = run->from.leaf + run->cube[number].leaf;
+	const uint64_t mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
+	const uint32_t n = (uint32_t)__builtin_popcountll(mask), begin = l->n;
+	const __m256i id = _mm256_set1_epi32((int)(run->id + number * PSR_BLOCK_SAMPLES));
+	const int with_normals = l->is_mixed | l->with_offsets;
+	uint8_t lane[64 + 8];
+	__m256 row[3], col[3];
+
+	for (int a = 0; a < 3; a++) {
+		row[a] = rows_at(placed->middle[a][which], l->octants->row[a]);
+		col[a] = cols_of(l->octants, a);
+	}
+	list_samples(lane, mask);
+	for (uint32_t k = 0; k < n; k += LANES) {
+		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(lane + k)));
+		const __m256i octant = _mm256_srli_epi32(s, 3);
+		const uint32_t to = begin + k;
+
+		for (int a = 0; a < 3; a++)
+			_mm256_storeu_ps(l->at[a] + to, axis_of(row[a], col[a], octant, s));
+		store(l->id + to, _mm256_add_epi32(id, s));
+		if (!with_normals)
+			continue;
+		const uint64_t n_ahead = tree->n_leaves - leaf - k;
+		_mm_storeu_si128((__m128i *)(l->normal + to), normals_of(tree->normal + leaf + k, n_ahead));
+		if (l->with_offsets)
+			_mm_storel_epi64((__m128i *)(l->offset + to), steps_of(tree->offset + leaf + k, n_ahead));
+	}
+	l->n = begin + n;
+}
+
+static const struct leaf_vectors vectors = { LANES, place, list, draw };
+
 uint64_t warp_leaves_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
-	return leaves_by(list_cube, target, entry, n);
+	return leaves_in(vectors, target, entry, n);
 }

@@ -10,16 +10,17 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 	const __m512i id = _mm512_set1_epi32((int)cube->id), kind = _mm512_set1_epi32(ewa_kind_of(t, entry));
 	const uint32_t n = (uint32_t)__builtin_popcountll(cube->mask);
 	_Alignas(64) uint8_t lane[64];
-	__m512 rows[3], normal[3];
+	__m512 rows[3], columns[3], normal[3];
 
 	list_lanes(lane, cube->mask);
 	for (int a = 0; a < 3; a++) {
-		rows[a] = rows_of(cube, a);
+		rows[a] = rows_at(cube->origin[a], octants->row[a]);
+		columns[a] = cols_of(octants, a);
 		normal[a] = _mm512_setzero_ps();
 	}
 	for (uint32_t i = 0, to = l->n; i < n; i += 16, to += 16) {
 		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(lane + i)));
-		const __m512i octant = _mm512_srli_epi32(s, 3), leaf = _mm512_and_si512(s, _mm512_set1_epi32(7));
+		const __m512i octant = _mm512_srli_epi32(s, 3), leaf = s;
 		const __mmask16 valid = (__mmask16)_bzhi_u32(0xffff, n - i);
 		__m512 offset = _mm512_setzero_ps();
 
@@ -28,7 +29,7 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 		if (cube->offset != NULL)
 			offset = offsets_of(cube->offset + i, valid);
 		for (int a = 0; a < 3; a++) {
-			const __m512 middle = axis_of(rows[a], octants->col[a], octant, leaf);
+			const __m512 middle = axis_of(rows[a], columns[a], octant, leaf);
 
 			_mm512_storeu_ps(l->at[a] + to, _mm512_add_ps(middle, offset_axis(octants, a, normal, offset)));
 			_mm512_storeu_ps(l->normal[a] + to, normal[a]);

@@ -5,18 +5,21 @@
 #include "simd/cube.h"
 #include "warp_parts.h"
 
-static inline __m512 rows_of(const struct warp_cube *cube, int a)
+/* Terms of an axis: of a cube's octants, given its middle's, and of leaves. */
+static inline __m512 rows_at(double middle, const double row[8])
 {
-	const __m512d at = _mm512_add_pd(_mm512_set1_pd(cube->origin[a]), _mm512_loadu_pd(cube->octants->row[a]));
-
-	return _mm512_castps256_ps512(_mm512_cvtpd_ps(at));
+	return _mm512_castps256_ps512(_mm512_cvtpd_ps(_mm512_add_pd(_mm512_set1_pd(middle), _mm512_loadu_pd(row))));
 }
 
-static inline __m512 axis_of(__m512 rows, const float *columns, __m512i octant, __m512i leaf)
+static inline __m512 cols_of(const struct warp_octants *octants, int a)
 {
-	const __m512 cols = _mm512_castps256_ps512(_mm256_loadu_ps(columns));
+	return _mm512_broadcast_f32x8(_mm256_loadu_ps(octants->col[a]));
+}
 
-	return _mm512_add_ps(_mm512_permutexvar_ps(octant, rows), _mm512_permutexvar_ps(leaf, cols));
+/* Of `leaf` the low three bits count. */
+static inline __m512 axis_of(__m512 rows, __m512 columns, __m512i octant, __m512i leaf)
+{
+	return _mm512_add_ps(_mm512_permutexvar_ps(octant, rows), _mm512_permutexvar_ps(leaf, columns));
 }
 
 static inline __m512 offset_axis(const struct warp_octants *octants, int a, const __m512 n[3], __m512 offset)

@@ -1,29 +1,15 @@
-/* The warp of leaves: two terms a place, as [B] (1), and where a leaf is wider than a pixel its offset. Cubes are placed
- * one by one, in vectors that their leaves do not fill; the steps after that have full ones, of leaves of several. */
-#include "simd/leaves_list.h"
+/* The warp of leaves: two terms a place, as [B] (1), and where a leaf is wider than a pixel its offset. */
+#include "simd/leaves_batch.h"
 #include "leaf_parts.h"
 
-#define BATCH 192 /* leaves: those of some twelve cubes, and what is known of them stays in L1 */
-#define ROOM (BATCH + PSR_BLOCK_SAMPLES + 16)
-
-/* Leaves of which all but their offsets is known of their places. */
-struct leaves {
-	_Alignas(64) float at[3][ROOM];
-	_Alignas(64) uint32_t id[ROOM];
-	_Alignas(64) uint16_t normal[ROOM];
-	_Alignas(64) uint8_t offset[ROOM];
-	uint32_t n;
-	/* Of all of them. */
-	const struct warp_instance *in;
-	const struct warp_octants *octants;
-	int level, is_mixed, with_offsets;
-};
+#define LANES 16
 
 /* ---- leaves to words ---- */
 
-static inline void draw_vector(struct leaves_lists *to, const struct leaves *l, const struct warp_target *t, uint32_t i,
-                               __mmask16 valid)
+static inline __attribute__((always_inline)) void draw(struct leaves_lists *to, const struct leaves *l,
+                                                       const struct warp_target *t, uint32_t i, uint32_t n)
 {
+	const __mmask16 valid = (__mmask16)_bzhi_u32(0xffff, n);
 	const int is_mixed = l->is_mixed, perspective = t->perspective;
 	__m512 x1 = _mm512_load_ps(l->at[0] + i), y1 = _mm512_load_ps(l->at[1] + i), z1 = _mm512_load_ps(l->at[2] + i);
 	__m512 normal[3];
@@ -55,53 +41,18 @@ static inline void draw_vector(struct leaves_lists *to, const struct leaves *l, 
 	to->words.n = list_words(&to->words, to->words.n, NULL, is_mixed, k, samples);
 }
 
-/* Draws the first n leaves. */
-static inline void draw_leaves(struct leaves_lists *to, const struct leaves *l, const struct warp_target *t, uint32_t n)
-{
-	for (uint32_t first = 0; first < n; first += PSR_BLOCK_SAMPLES) {
-		const uint32_t end = n - first < PSR_BLOCK_SAMPLES ? n : first + PSR_BLOCK_SAMPLES;
-
-		make_room(to, t, (uint32_t)l->level);
-		for (uint32_t i = first; i < end; i += 16)
-			draw_vector(to, l, t, i, (__mmask16)_bzhi_u32(0xffff, end - i));
-	}
-}
-
-/* Draws whole vectors of leaves, and keeps the rest. */
-static inline void draw_most(struct leaves_lists *to, struct leaves *l, const struct warp_target *t)
-{
-	const uint32_t whole = l->n & ~15u;
-
-	draw_leaves(to, l, t, whole);
-	for (int a = 0; a < 3; a++)
-		_mm512_store_ps(l->at[a], _mm512_load_ps(l->at[a] + whole));
-	_mm512_store_si512(l->id, _mm512_load_si512(l->id + whole));
-	_mm256_store_si256((__m256i *)l->normal, _mm256_load_si256((const __m256i *)(l->normal + whole)));
-	_mm_store_si128((__m128i *)l->offset, _mm_load_si128((const __m128i *)(l->offset + whole)));
-	l->n -= whole;
-}
-
 /* ---- cubes to leaves ---- */
 
-/* Cubes of a run, as leaves' places begin. */
-struct run {
-	const struct psr_cube_level *level;
-	const struct psr_cube *cube; /* that of bit 0 */
-	struct psr_cube_run from;
-	uint32_t id;                 /* of its first leaf */
-	__m512 col[3];
-};
-
-/* Computes the middles of n cubes, eight at a time. */
-static inline void place_middles(double middle[3][CUBES_RUN], const struct warp_cubes *to, const struct run *run,
-                                 const uint8_t number[CUBES_RUN], uint32_t n)
+static inline void place(struct placed_cubes *placed, const struct warp_cubes *to, const struct run *run, uint64_t cubes)
 {
 	const __m256i words = _mm256_set1_epi32(sizeof *run->cube / 4);
 	const __m512i most = _mm512_set1_epi64((1 << CUBES_PLACE_BITS) - 1), two = _mm512_set1_epi64(2);
 	const __m512d edge = _mm512_set1_pd(run->level->edge);
+	const uint32_t n = (uint32_t)__builtin_popcountll(cubes);
 
+	list_lanes(placed->number, cubes);
 	for (uint32_t i = 0; i < n; i += 8) {
-		const __m256i at = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(number + i)));
+		const __m256i at = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(placed->number + i)));
 		const __m512i place = _mm512_i32gather_epi64(_mm256_mullo_epi32(at, words), run->cube->place, 4);
 		__m512d c[3];
 
@@ -118,36 +69,35 @@ static inline void place_middles(double middle[3][CUBES_RUN], const struct warp_
 			const __m512d z = _mm512_mul_pd(_mm512_set1_pd(axis[2]), c[2]);
 			const __m512d sum = _mm512_add_pd(_mm512_add_pd(x, y), z);
 
-			_mm512_store_pd(middle[a] + i, _mm512_add_pd(_mm512_set1_pd(to->origin[a]), sum));
+			_mm512_store_pd(placed->middle[a] + i, _mm512_add_pd(_mm512_set1_pd(to->origin[a]), sum));
 		}
 	}
 }
 
-static inline __m512 rows_at(double middle, const double row[8])
-{
-	return _mm512_castps256_ps512(_mm512_cvtpd_ps(_mm512_add_pd(_mm512_set1_pd(middle), _mm512_loadu_pd(row))));
-}
-
-/* Lists the leaves of cube `number` of a run. */
-static inline void list_cube(struct leaves *l, const struct run *run, uint32_t number, const __m512 row[3])
+static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which)
 {
 	const struct octree *tree = run->level->tree;
+	const uint32_t number = placed->number[which];
 	const uint32_t code = run->from.code + run->cube[number].code, leaf = run->from.leaf + run->cube[number].leaf;
 	const uint64_t mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
 	const uint32_t n = (uint32_t)__builtin_popcountll(mask), begin = l->n;
 	const __m512i id = _mm512_set1_epi32((int)(run->id + number * PSR_BLOCK_SAMPLES));
 	const int with_normals = l->is_mixed | l->with_offsets;
 	_Alignas(64) uint8_t lane[64];
+	__m512 row[3], col[3];
 
+	for (int a = 0; a < 3; a++) {
+		row[a] = rows_at(placed->middle[a][which], l->octants->row[a]);
+		col[a] = cols_of(l->octants, a);
+	}
 	list_lanes(lane, mask);
-	for (uint32_t k = 0; k < n; k += 16) {
+	for (uint32_t k = 0; k < n; k += LANES) {
 		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(lane + k)));
 		const __m512i octant = _mm512_srli_epi32(s, 3);
 		const uint32_t to = begin + k;
 
-		for (int a = 0; a < 3; a++) /* of s the lower three bits count, since the upper half of col is the lower */
-			_mm512_storeu_ps(l->at[a] + to, _mm512_add_ps(_mm512_permutexvar_ps(octant, row[a]),
-			                                              _mm512_permutexvar_ps(s, run->col[a])));
+		for (int a = 0; a < 3; a++)
+			_mm512_storeu_ps(l->at[a] + to, axis_of(row[a], col[a], octant, s));
 		_mm512_storeu_si512(l->id + to, _mm512_add_epi32(id, s));
 		if (!with_normals)
 			continue;
@@ -159,59 +109,9 @@ static inline void list_cube(struct leaves *l, const struct run *run, uint32_t n
 	l->n = begin + n;
 }
 
-static inline void list_run(struct leaves_lists *to, struct leaves *l, const struct warp_target *t,
-                            const struct bin_entry *entry, uint64_t cubes)
-{
-	const struct warp_instance *in = &t->instance[entry->instance];
-	const struct psr_cubes *model = in->cubes->model;
-	const uint32_t first = entry->slot - in->first_slot;
-	struct run run = { .level = psr_cubes_level(model, first), .cube = &model->cube[first],
-		               .id = entry->slot * PSR_BLOCK_SAMPLES };
-	const struct warp_octants *octants = &in->cubes->level[run.level - model->level];
-	const struct octree *tree = run.level->tree;
-	const int with_offsets = entry->is_wide && tree->offset != NULL && tree->normal != NULL;
-	const uint32_t n = (uint32_t)__builtin_popcountll(cubes);
-	_Alignas(64) uint8_t number[CUBES_RUN];
-	_Alignas(64) double middle[3][CUBES_RUN];
-
-	if (octants != l->octants || entry->level != l->level || entry->is_mixed != l->is_mixed
-	    || with_offsets != l->with_offsets) {
-		draw_leaves(to, l, t, l->n);
-		l->n = 0;
-		l->in = in;
-		l->octants = octants;
-		l->level = entry->level;
-		l->is_mixed = entry->is_mixed;
-		l->with_offsets = with_offsets;
-	}
-	run.from = run.level->run[(first - run.level->first) / CUBES_RUN];
-	for (int a = 0; a < 3; a++)
-		run.col[a] = _mm512_broadcast_f32x8(_mm256_loadu_ps(octants->col[a]));
-	list_lanes(number, cubes);
-	place_middles(middle, in->cubes, &run, number, n);
-	for (uint32_t i = 0; i < n; i++) {
-		const __m512 row[3] = { rows_at(middle[0][i], octants->row[0]), rows_at(middle[1][i], octants->row[1]),
-			                    rows_at(middle[2][i], octants->row[2]) };
-
-		list_cube(l, &run, number[i], row);
-		if (l->n > BATCH)
-			draw_most(to, l, t);
-	}
-}
+static const struct leaf_vectors vectors = { LANES, place, list, draw };
 
 uint64_t warp_leaves_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
-	struct leaves_lists lists;
-	struct leaves leaves;
-
-	leaves_begin(&lists);
-	leaves.n = 0;
-	leaves.octants = NULL;
-	leaves.level = 0;
-	for (uint32_t e = 0; e < n; e++) {
-		fetch_next(target, entry, e, n);
-		list_run(&lists, &leaves, target, &entry[e], target->cubes != NULL ? target->cubes[entry[e].hit] : 1);
-	}
-	draw_leaves(&lists, &leaves, target, leaves.n);
-	return leaves_end(&lists, target);
+	return leaves_in(vectors, target, entry, n);
 }
