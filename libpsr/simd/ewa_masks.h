@@ -17,6 +17,7 @@
 #define EWA_MOST_RADIUS 7
 #define EWA_SIDE(radius) (2 * (radius) + 1)
 #define EWA_BYTES 172544 /* of all masks */
+#define EWA_BEYOND 8     /* bytes behind them that vectors may read */
 
 /* A size is for edges up to `edge` pixels, and from the one before; its masks have 2 radius + 1 pixels a side. From one
  * to the next edges grow by the cube root of 2; up to the first one a pixel's samples leave no pixel of a surface open,
@@ -29,7 +30,7 @@ struct ewa_size {
 extern const struct ewa_size ewa_size[EWA_SIZES];
 
 /* By size, shape, sector, row and column: 255 times the Gaussian's mean in the pixel. */
-extern const uint8_t ewa_weight[EWA_BYTES];
+extern const uint8_t ewa_weight[EWA_BYTES + EWA_BEYOND];
 /* By size, shape and sector: a pixel of this weight is the leaf's own, others' colours are mixed with it alone. */
 extern const uint8_t ewa_core[EWA_MASKS];
 

@@ -112,7 +112,7 @@ int main(void)
 	static unsigned core[EWA_MASKS];
 	uint32_t first = 0;
 
-	printf("#include \"libpsr/simd/ewa_masks.h\"\nconst uint8_t ewa_weight[EWA_BYTES] = {");
+	printf("#include \"libpsr/simd/ewa_masks.h\"\nconst uint8_t ewa_weight[EWA_BYTES + EWA_BEYOND] = {");
 	for (uint32_t k = 0; k < EWA_SIZES; k++)
 		for (uint32_t i = 0; i < EWA_SHAPES * EWA_SECTORS; i++)
 			core[k * EWA_SHAPES * EWA_SECTORS + i] = write_mask(&sizes[k], i / EWA_SECTORS, i % EWA_SECTORS);
