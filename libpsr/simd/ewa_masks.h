@@ -19,12 +19,12 @@
 #define EWA_BYTES 172544 /* of all masks */
 #define EWA_BEYOND 8     /* bytes behind them that vectors may read */
 
-/* A size is for edges up to `edge` pixels, and from the one before; its masks have 2 radius + 1 pixels a side. From one
- * to the next edges grow by the cube root of 2; up to the first one a pixel's samples leave no pixel of a surface open,
+/* A size is for edges up to `edge` pixels, and from the one before; its masks have 2 radius + 1 pixels a side, of which
+ * the middle 2 core_radius + 1 hold all cores. From one to the next edges grow by the cube root of 2; up to the first one a pixel's samples leave no pixel of a surface open,
  * see CUBES_SPACING. The others reach 1.2 edges at least. */
 struct ewa_size {
 	float edge;
-	uint32_t radius;
+	uint32_t radius, core_radius;
 	uint32_t first; /* place in ewa_weight */
 };
 extern const struct ewa_size ewa_size[EWA_SIZES];

@@ -67,9 +67,9 @@ static inline __m128i four_weights(const uint8_t *weight)
  * to wait. */
 static inline void draw_words(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part)
 {
-	const int32_t middle = one->x - t->x0, first = middle - one->radius, begin = first & ~3;
-	const int32_t end = (middle + one->radius + 4) & ~3, dy = part->y0 - one->y;
-	const __m128i radius = _mm_set1_epi32(one->radius + 1), core = _mm_set1_epi32((int)one->core - 1);
+	const int32_t middle = one->x - t->x0, begin = (middle - one->core_radius) & ~3;
+	const int32_t end = (middle + one->core_radius + 4) & ~3, dy = part->y0 - one->y;
+	const __m128i reach = _mm_set1_epi32(one->core_radius + 1), core = _mm_set1_epi32((int)one->core - 1);
 	const __m128 near_z = _mm_set1_ps(t->near_z);
 	const __m256i id = _mm256_set1_epi64x(one->id);
 
@@ -79,9 +79,9 @@ static inline void draw_words(const struct warp_target *t, const struct ewa_one 
 	}
 	for (int32_t x = begin; x < end; x += 4) {
 		const __m128i dx = _mm_add_epi32(_mm_set1_epi32(x - middle), _mm_setr_epi32(0, 1, 2, 3));
-		const __m128i is_column = _mm_cmpgt_epi32(radius, _mm_abs_epi32(dx));
+		const __m128i is_column = _mm_cmpgt_epi32(reach, _mm_abs_epi32(dx));
 		const __m128 across = _mm_mul_ps(_mm_cvtepi32_ps(dx), _mm_set1_ps(one->zx));
-		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + (x - first);
+		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + (x - middle + one->radius);
 		uint64_t *row = t->word + (size_t)(part->y0 - t->y0) * t->stride + (size_t)x;
 
 		for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, weight += one->next) {

@@ -8,7 +8,7 @@
 /* ---- one splat: what is drawn of it ---- */
 
 struct ewa_one {
-	int32_t x, y, radius;
+	int32_t x, y, radius, core_radius;
 	float z, zx, zy, least; /* z' in the middle of pixel (x, y), what a pixel to the right or down adds, the least */
 	const uint8_t *weight;  /* of the first row, */
 	int32_t next;           /* and how far the next row is */
@@ -23,6 +23,7 @@ static inline void ewa_pick(struct ewa_one *one, const struct ewa_leaves *l, uin
 	one->x = l->x[i];
 	one->y = l->y[i];
 	one->radius = (int32_t)radius;
+	one->core_radius = (int32_t)ewa_size[size].core_radius;
 	one->z = l->z[i];
 	one->zx = l->zx[i];
 	one->zy = l->zy[i];
@@ -307,7 +308,7 @@ static inline __attribute__((always_inline)) uint64_t ewa_words_by(struct ewa_pa
 				continue;
 			}
 			ewa_pick(&one, &l, i);
-			if (ewa_clip(&part, t, one.x, one.y, one.radius))
+			if (ewa_clip(&part, t, one.x, one.y, one.core_radius))
 				parts.draw_words(t, &one, &part);
 		}
 	}

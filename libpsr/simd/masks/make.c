@@ -10,8 +10,9 @@
 #define CORE 0.25 /* of a mask's greatest weight (decision 0121) */
 
 static const struct ewa_size sizes[EWA_SIZES] = {
-	{ 0.70710678f, 0, 0 }, { 0.89089872f, 1, 0 }, { 1.1224620f, 1, 0 }, { 1.4142136f, 2, 0 }, { 1.7817974f, 2, 0 },
-	{ 2.2449241f, 3, 0 },  { 2.8284271f, 4, 0 },  { 3.5635949f, 4, 0 }, { 4.4898482f, 6, 0 }, { 5.6568542f, 7, 0 },
+	{ 0.70710678f, 0, 0, 0 }, { 0.89089872f, 1, 1, 0 }, { 1.1224620f, 1, 1, 0 }, { 1.4142136f, 2, 1, 0 },
+	{ 1.7817974f, 2, 1, 0 },  { 2.2449241f, 3, 2, 0 },  { 2.8284271f, 4, 2, 0 }, { 3.5635949f, 4, 3, 0 },
+	{ 4.4898482f, 6, 4, 0 },  { 5.6568542f, 7, 5, 0 },
 };
 
 /* exp(-x) for x of 0 or more: halves x until a polynomial is exact. */
@@ -124,7 +125,8 @@ int main(void)
 		printf("%s%d,", i % 32 == 0 ? "\n" : "", (int)(255 * falling_exp((i + 0.5) / (2 * EWA_STEPS)) + 0.5));
 	printf("\n};\nconst struct ewa_size ewa_size[EWA_SIZES] = {\n");
 	for (uint32_t k = 0; k < EWA_SIZES; k++) {
-		printf("{ %.9gf, %u, %u },\n", (double)sizes[k].edge, (unsigned)sizes[k].radius, (unsigned)first);
+		printf("{ %.9gf, %u, %u, %u },\n", (double)sizes[k].edge, (unsigned)sizes[k].radius,
+		       (unsigned)sizes[k].core_radius, (unsigned)first);
 		first += EWA_SHAPES * EWA_SECTORS * EWA_SIDE(sizes[k].radius) * EWA_SIDE(sizes[k].radius);
 	}
 	printf("};\n");

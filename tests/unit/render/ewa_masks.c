@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
+#include <stdlib.h>
 #include "simd/ewa_masks.h"
 
 #define PI 3.14159265358979323846
@@ -99,6 +100,23 @@ static void each_mask_has_a_core_around_its_middle(void **state)
 		}
 }
 
+static void the_core_radius_is_the_least_that_holds_all_cores(void **state)
+{
+	(void)state;
+	for (uint32_t k = 0; k < EWA_SIZES; k++) {
+		const int radius = (int)ewa_size[k].radius, side = EWA_SIDE(radius);
+		int most = 0;
+
+		for (int i = 0; i < EWA_SHAPES * EWA_SECTORS * side * side; i++) {
+			const int x = abs(i % side - radius), y = abs(i / side % side - radius), at = x > y ? x : y;
+
+			if (ewa_weight[(int)ewa_size[k].first + i] >= ewa_core[(int)k * EWA_SHAPES * EWA_SECTORS + i / (side * side)])
+				most = at > most ? at : most;
+		}
+		assert_int_equal(ewa_size[k].core_radius, most);
+	}
+}
+
 static void sizes_fill_the_table(void **state)
 {
 	uint32_t first = 0;
@@ -140,6 +158,7 @@ int main(void)
 		cmocka_unit_test(masks_are_integrals_over_pixels),
 		cmocka_unit_test(the_bell_is_the_exponential),
 		cmocka_unit_test(each_mask_has_a_core_around_its_middle),
+		cmocka_unit_test(the_core_radius_is_the_least_that_holds_all_cores),
 		cmocka_unit_test(sizes_fill_the_table),
 		cmocka_unit_test(shapes_are_64_tilts_of_an_octant),
 	};
