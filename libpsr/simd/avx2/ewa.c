@@ -40,67 +40,69 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 	l->n += n;
 }
 
-/* Whether these columns of the tile are in it; masks that reach beyond it are drawn pixel by pixel. */
+/* Masks that reach beyond the tile's columns are drawn pixel by pixel. */
 static inline int has_columns(const struct warp_target *t, int32_t first, int32_t end)
 {
 	return first >= 0 && end <= t->x1 - t->x0;
 }
 
-/* Minima of words as unsigned integers. */
-static inline __m256i least_of(__m256i a, __m256i b)
+/* The depths of eight columns: at dx from the middle's, in a row at dy. */
+static inline __m256 depths_of(const struct ewa_one *one, __m256i dx, int32_t dy)
 {
-	const __m256i sign = _mm256_set1_epi64x(INT64_MIN);
-	const __m256i is_above = _mm256_cmpgt_epi64(_mm256_xor_si256(a, sign), _mm256_xor_si256(b, sign));
+	const __m256 across = _mm256_mul_ps(_mm256_cvtepi32_ps(dx), _mm256_set1_ps(one->zx));
+	const __m256 z = _mm256_add_ps(_mm256_set1_ps(one->z), _mm256_add_ps(across, _mm256_set1_ps((float)dy * one->zy)));
 
-	return _mm256_blendv_epi8(a, b, is_above);
+	return _mm256_max_ps(z, _mm256_set1_ps(one->least));
 }
 
-static inline __m128i four_weights(const uint8_t *weight)
+static inline __m256i eight_weights(const uint8_t *weight)
 {
-	int32_t four;
+	return _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)weight));
+}
 
-	memcpy(&four, weight, sizeof four);
-	return _mm_cvtepu8_epi32(_mm_cvtsi32_si128(four));
+/* Lowers four words: to z and id where all bits of a lane of k are set. */
+static inline void lower_four(uint64_t *row, __m128i k, __m128i z, __m256i id)
+{
+	const __m256i sign = _mm256_set1_epi64x(INT64_MIN), there = _mm256_loadu_si256((const __m256i *)row);
+	const __m256i own = _mm256_or_si256(_mm256_slli_epi64(_mm256_cvtepu32_epi64(z), 32), id);
+	const __m256i is_nearer = _mm256_cmpgt_epi64(_mm256_xor_si256(there, sign), _mm256_xor_si256(own, sign));
+
+	store(row, _mm256_blendv_epi8(there, own, _mm256_and_si256(is_nearer, _mm256_cvtepi32_epi64(k))));
 }
 
 /* Rows are parted alike for all splats: a load that overlaps the store before it, and is not of the same four words, has
  * to wait. */
 static inline void draw_words(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part)
 {
-	const int32_t middle = one->x - t->x0, begin = (middle - one->core_radius) & ~3;
-	const int32_t end = (middle + one->core_radius + 4) & ~3, dy = part->y0 - one->y;
-	const __m128i reach = _mm_set1_epi32(one->core_radius + 1), core = _mm_set1_epi32((int)one->core - 1);
-	const __m128 near_z = _mm_set1_ps(t->near_z);
+	const int32_t middle = one->x - t->x0, begin = (middle - one->core_radius) & ~3, end = middle + one->core_radius + 1;
+	const __m256i reach = _mm256_set1_epi32(one->core_radius + 1), core = _mm256_set1_epi32((int)one->core - 1);
 	const __m256i id = _mm256_set1_epi64x(one->id);
+	const __m256 near_z = _mm256_set1_ps(t->near_z);
 
-	if (!has_columns(t, begin, end)) {
+	if (!has_columns(t, begin, begin + ((end - begin + 7) & ~7))) {
 		ewa_draw_words(t, one, part);
 		return;
 	}
-	for (int32_t x = begin; x < end; x += 4) {
-		const __m128i dx = _mm_add_epi32(_mm_set1_epi32(x - middle), _mm_setr_epi32(0, 1, 2, 3));
-		const __m128i is_column = _mm_cmpgt_epi32(reach, _mm_abs_epi32(dx));
-		const __m128 across = _mm_mul_ps(_mm_cvtepi32_ps(dx), _mm_set1_ps(one->zx));
-		const uint8_t *weight = one->weight + (dy + one->radius) * one->next + (x - middle + one->radius);
+	for (int32_t x = begin; x < end; x += 8) {
+		const __m256i dx = _mm256_add_epi32(_mm256_set1_epi32(x - middle), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+		const __m256i is_column = _mm256_cmpgt_epi32(reach, _mm256_abs_epi32(dx));
+		const uint8_t *weight = one->weight + (part->y0 - one->y + one->radius) * one->next + (x - middle + one->radius);
 		uint64_t *row = t->word + (size_t)(part->y0 - t->y0) * t->stride + (size_t)x;
 
 		for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, weight += one->next) {
-			const __m128 down = _mm_set1_ps((float)(y - one->y) * one->zy);
-			const __m128 plane = _mm_add_ps(_mm_set1_ps(one->z), _mm_add_ps(across, down));
-			const __m128 z = _mm_max_ps(plane, _mm_set1_ps(one->least));
-			const __m128i is_own = _mm_and_si128(is_column, _mm_cmpgt_epi32(four_weights(weight), core));
-			const __m128i k = _mm_and_si128(is_own, _mm_castps_si128(_mm_cmp_ps(z, near_z, _CMP_GT_OQ)));
-			const __m256i high = _mm256_slli_epi64(_mm256_cvtepu32_epi64(_mm_castps_si128(z)), 32);
-			const __m256i none = _mm256_xor_si256(_mm256_cvtepi32_epi64(k), _mm256_set1_epi64x(-1));
-			const __m256i word = _mm256_or_si256(_mm256_or_si256(high, id), none); /* none: no word is above it */
+			const __m256 z = depths_of(one, dx, y - one->y);
+			const __m256i is_own = _mm256_and_si256(is_column, _mm256_cmpgt_epi32(eight_weights(weight), core));
+			const __m256i k = _mm256_and_si256(is_own, _mm256_castps_si256(_mm256_cmp_ps(z, near_z, _CMP_GT_OQ)));
+			const __m256i bits = _mm256_castps_si256(z);
 
-			store(row, least_of(_mm256_loadu_si256((const __m256i *)row), word));
+			lower_four(row, _mm256_castsi256_si128(k), _mm256_castsi256_si128(bits), id);
+			lower_four(row + 4, _mm256_extracti128_si256(k, 1), _mm256_extracti128_si256(bits, 1), id);
 		}
 	}
 }
 
 /* z' of eight words. */
-static inline __m256 depths_of(const uint64_t *row)
+static inline __m256 upper_of(const uint64_t *row)
 {
 	const __m256 a = _mm256_loadu_ps((const float *)row), b = _mm256_loadu_ps((const float *)(row + 4));
 	const __m256i upper = _mm256_castps_si256(_mm256_shuffle_ps(a, b, _MM_SHUFFLE(3, 1, 3, 1)));
@@ -108,46 +110,44 @@ static inline __m256 depths_of(const uint64_t *row)
 	return _mm256_castsi256_ps(_mm256_permute4x64_epi64(upper, _MM_SHUFFLE(3, 1, 2, 0)));
 }
 
-/* The weights at eight columns of a row, 0 where another surface is before the splat's. */
-static inline __m256i weights_of(const uint64_t *row, const uint8_t *weight, __m256 z)
+/* Adds a splat's next n columns, 8 at most. */
+static inline __attribute__((always_inline)) void add_columns(const struct warp_target *t, const struct ewa_one *one,
+                                                              const struct ewa_part *part, float same, __m256i value,
+                                                              int32_t first, int32_t n)
 {
-	const __m256i k = _mm256_castps_si256(_mm256_cmp_ps(z, depths_of(row), _CMP_LE_OQ));
+	const __m256i dx = _mm256_add_epi32(_mm256_set1_epi32(first), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+	const ptrdiff_t x = one->x + first - t->x0;
+	const uint8_t *weight = one->weight + (part->y0 - one->y + one->radius) * one->next + (first + one->radius);
+	const uint64_t *row = t->word + (ptrdiff_t)(part->y0 - t->y0) * t->stride + x;
+	struct ewa_sum *sum = t->sum + (ptrdiff_t)(part->y0 - t->y0) * t->sum_stride + x;
+	_Alignas(32) int32_t weights[8];
 
-	return _mm256_and_si256(k, _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)weight)));
+	for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, sum += t->sum_stride, weight += one->next) {
+		const __m256 z = _mm256_sub_ps(depths_of(one, dx, y - one->y), _mm256_set1_ps(same));
+		const __m256i is_same = _mm256_castps_si256(_mm256_cmp_ps(z, upper_of(row), _CMP_LE_OQ));
+
+		store(weights, _mm256_and_si256(is_same, eight_weights(weight)));
+		for (int32_t i = 0; i < n; i++) { /* products of 16 bits: 255 by 511 or EWA_COLOR_ONE */
+			const __m256i more = _mm256_madd_epi16(value, _mm256_set1_epi32(weights[i]));
+
+			store(sum[i].lane, _mm256_add_epi32(_mm256_load_si256((const __m256i *)sum[i].lane), more));
+		}
+	}
 }
 
 static inline void draw_sums(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part,
                              float same, const uint32_t value[EWA_LANES])
 {
-	const int32_t middle = one->x - t->x0, first = middle - one->radius, side = one->radius + one->radius + 1;
+	const int32_t radius = one->radius, side = 2 * radius + 1, first = one->x - radius - t->x0;
 	const __m256i own = _mm256_loadu_si256((const __m256i *)value);
-	const __m256 behind = _mm256_set1_ps(same), least = _mm256_set1_ps(one->least);
-	_Alignas(32) int32_t weights[8];
 
-	if (!has_columns(t, first, first + ((side + 7) & ~7))) {
+	if (!has_columns(t, first, first + ((side + 7) & ~7)))
 		ewa_draw_sums(t, one, part, same, value);
-		return;
-	}
-	for (int32_t c = 0; c < side; c += 8) {
-		const __m256i dx = _mm256_add_epi32(_mm256_set1_epi32(c - one->radius), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-		const __m256 across = _mm256_mul_ps(_mm256_cvtepi32_ps(dx), _mm256_set1_ps(one->zx));
-		const int32_t n = side - c < 8 ? side - c : 8;
-		const uint8_t *weight = one->weight + (part->y0 - one->y + one->radius) * one->next + c;
-		const uint64_t *row = t->word + (size_t)(part->y0 - t->y0) * t->stride + (size_t)(first + c);
-		struct ewa_sum *sum = t->sum + (size_t)(part->y0 - t->y0) * t->sum_stride + (size_t)(first + c);
-
-		for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, sum += t->sum_stride, weight += one->next) {
-			const __m256 down = _mm256_set1_ps((float)(y - one->y) * one->zy);
-			const __m256 plane = _mm256_add_ps(_mm256_set1_ps(one->z), _mm256_add_ps(across, down));
-
-			store(weights, weights_of(row, weight, _mm256_sub_ps(_mm256_max_ps(plane, least), behind)));
-			for (int32_t i = 0; i < n; i++) { /* products of 16 bits: 255 by 511 or EWA_COLOR_ONE */
-				const __m256i more = _mm256_madd_epi16(own, _mm256_set1_epi32(weights[i]));
-
-				store(sum[i].lane, _mm256_add_epi32(_mm256_load_si256((const __m256i *)sum[i].lane), more));
-			}
-		}
-	}
+	else if (radius == 1) /* most often */
+		add_columns(t, one, part, same, own, -1, 3);
+	else
+		for (int32_t x = -radius; x <= radius; x += 8)
+			add_columns(t, one, part, same, own, x, radius + 1 - x < 8 ? radius + 1 - x : 8);
 }
 
 static const struct ewa_parts parts = { list_leaves, ewa_sort_words, ewa_sort_sums, draw_words, draw_sums };
