@@ -200,9 +200,10 @@ static inline int32_t is_same_aslant(float limit, float rise, float up, float ne
 	return -((other >= limit) & (near >= others_limit - rise - up));
 }
 
-/* Returns how many pixels have a neighbour behind. `weights` is NULL, or of the three rows in the middle. */
+/* Returns how many of the first n pixels have a neighbour behind. `weights` is NULL, or of the three rows in the middle.
+ */
 static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x,
-                                                                   const struct smooth_row *const *row,
+                                                                   size_t n, const struct smooth_row *const *row,
                                                                    const struct smooth_weights *const *weights)
 {
 	const size_t first = x + FIRST;
@@ -261,21 +262,22 @@ static inline __attribute__((always_inline)) uint32_t smooth_edges(int32_t (*res
 
 			code[c][x + k] = smooth_code(front * share + back * rest);
 		}
-		n_edges += edges > 0;
+		n_edges += (edges > 0) & (k < n);
 	}
 	return (uint32_t)n_edges;
 }
 
-/* Smooths a run. `weights`: NULL, or of the three rows in the middle. */
-static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, const struct smooth_row *const *row,
-                           int32_t is_inside, const struct smooth_weights *const *weights)
+/* Smooths a run, of which n pixels are in the piece. `weights`: NULL, or of the three rows in the middle. */
+static uint32_t smooth_run(int32_t (*restrict code)[SMOOTH_WIDTH], size_t x, size_t n,
+                           const struct smooth_row *const *row, int32_t is_inside,
+                           const struct smooth_weights *const *weights)
 {
 	const size_t k = x / SMOOTH_RUN;
 
 	if (weights != NULL && !(weights[0]->has_any[k] | weights[1]->has_any[k] | weights[2]->has_any[k]))
 		weights = NULL;
 	if (!is_inside)
-		return weights != NULL ? smooth_edges(code, x, row, weights) : smooth_edges(code, x, row, NULL);
+		return weights != NULL ? smooth_edges(code, x, n, row, weights) : smooth_edges(code, x, n, row, NULL);
 	if (weights != NULL)
 		smooth_samples(code, x, row, weights);
 	else
@@ -320,7 +322,7 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 		find_inside(is_inside, row + MARGIN, n);
 		leave_border(is_inside, t, x0, n, (uint32_t)own);
 		for (uint32_t x = 0; x < n; x += SMOOTH_RUN)
-			n_edges += smooth_run(code, x, row + MARGIN, is_inside[x / SMOOTH_RUN], t->place != NULL ? around : NULL);
+			n_edges += smooth_run(code, x, n - x, row + MARGIN, is_inside[x / SMOOTH_RUN], t->place != NULL ? around : NULL);
 		for (size_t i = 0; i < n; i++)
 			for (size_t c = 0; c < 3; c++)
 				to[3 * i + c] = (uint8_t)code[c][i];

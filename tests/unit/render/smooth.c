@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
+#include "base/random.h"
 #include "base/srgb.h"
 #include "base/pool.h"
 #include "render/plan.h"
@@ -158,6 +159,35 @@ static void without_samples_nothing_changes(void **state)
 
 		assert_int_equal(smooth(light, row, step), smooth_placed(with, row, step, place));
 		assert_memory_equal(with, light, sizeof light);
+	}
+}
+
+/* However a picture is cut, and however long the runs are that kernels take at a time. */
+static void pieces_change_the_same_pixels_and_count_each_once(void **state)
+{
+	enum { WIDTH = 83, HEIGHT = 5 };
+	static uint8_t from[HEIGHT][WIDTH][3], whole[HEIGHT][WIDTH][3], pieces[HEIGHT][WIDTH][3];
+	static float depth[HEIGHT][WIDTH];
+	struct smooth_target target = { .from = from[0][0], .to = whole[0][0], .depth = depth[0], .width = WIDTH,
+		                            .height = HEIGHT, .scale = 1, .offset = 0.03f };
+	uint64_t seed = 1;
+
+	(void)state;
+	for (int y = 0; y < HEIGHT; y++)
+		for (int x = 0; x < WIDTH; x++) {
+			memset(from[y][x], (int)random_below(&seed, 256), 3);
+			depth[y][x] = random_below(&seed, 3) ? 1 : 2;
+		}
+	const uint32_t n_edges = simd_get()->smooth(&target, 0, WIDTH, 0, HEIGHT);
+	assert_in_range(n_edges, WIDTH * HEIGHT / 4, WIDTH * HEIGHT);
+	target.to = pieces[0][0];
+	for (uint32_t width = 1; width <= 40; width++) {
+		uint32_t n = 0;
+
+		for (uint32_t x = 0; x < WIDTH; x += width)
+			n += simd_get()->smooth(&target, x, x + width < WIDTH ? x + width : WIDTH, 0, HEIGHT);
+		assert_int_equal(n, n_edges);
+		assert_memory_equal(pieces, whole, sizeof whole);
 	}
 }
 
@@ -356,6 +386,7 @@ int main(void)
 		cmocka_unit_test(samples_count_by_where_they_lie),
 		cmocka_unit_test(samples_of_what_is_behind_count_for_nothing),
 		cmocka_unit_test(without_samples_nothing_changes),
+		cmocka_unit_test(pieces_change_the_same_pixels_and_count_each_once),
 		cmocka_unit_test(only_color_changes_and_alike_for_any_threads_and_planes),
 		cmocka_unit_test(the_rim_of_a_sphere_is_three_times_as_true),
 		cmocka_unit_test(a_grazed_plane_is_one_surface),
