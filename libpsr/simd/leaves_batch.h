@@ -114,6 +114,7 @@ static inline __attribute__((always_inline)) uint64_t leaves_in(struct leaf_vect
 	struct leaves leaves;
 
 	leaves_begin(&lists);
+	memset(leaves.normal, 0, sizeof leaves.normal); /* a vector looks up those behind its last leaf, too */
 	leaves.n = 0;
 	leaves.octants = NULL;
 	leaves.level = leaves.is_mixed = leaves.with_offsets = 0;

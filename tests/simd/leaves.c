@@ -6,14 +6,16 @@
 #include "tests/simd/lib/picture.h"
 
 #define MAX_LEVELS 3
+#define UNEVEN 17 /* leaves of a cube in the mean: of benchmarks whose cubes have any number, and may face away */
 
 enum numbers { PLAIN, SPOILT };
 enum kernel { LEAVES, RUNS, WORDS, SUMS };
 
-/* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0: any. */
+/* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0 and UNEVEN: any. */
 static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, struct psr_cube *cube,
                         const uint32_t n[2])
 {
+	const int is_any = n[1] == 0 || n[1] == UNEVEN;
 	uint8_t some[64 * 9];
 	uint32_t n_codes = 0, n_leaves = 0;
 
@@ -24,10 +26,10 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 			run[i / CUBES_RUN] = (struct psr_cube_run){ n_codes, n_leaves };
 		cube[i].code = (uint16_t)(n_codes - run[i / CUBES_RUN].code);
 		cube[i].leaf = (uint16_t)(n_leaves - run[i / CUBES_RUN].leaf);
-		some[at] = n[1] == 0 ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x69;
+		some[at] = is_any ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x69;
 		n_codes++;
 		for (int j = 0; j < __builtin_popcount(some[at]); j++) {
-			some[n_codes] = n[1] == 0 ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x4d;
+			some[n_codes] = is_any ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x4d;
 			n_leaves += (uint32_t)__builtin_popcount(some[n_codes++]);
 		}
 	}
@@ -37,7 +39,7 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 		                     .n_codes = n_codes, .n_leaves = n_leaves };
 	if (check_one_in(c, 2))
 		tree->color = check_in(c, n_leaves, sizeof *tree->color);
-	if (check_one_in(c, 4))
+	if (check_one_in(c, 4) && n[1] != UNEVEN)
 		return;
 	tree->normal = check_in(c, n_leaves, sizeof *tree->normal);
 	for (uint32_t i = 0; i < n_leaves; i++)
@@ -49,7 +51,7 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 		tree->offset[i] %= OCTREE_OFFSETS;
 }
 
-/* n_cubes of each level, 64 at most; n_leaves of each, 64, 16, or 0 for any. */
+/* n_cubes of each level, 64 at most; n_leaves of each, 64, 16, UNEVEN, or 0 for any. */
 static struct psr_cubes *random_cubes(struct check *c, uint32_t n_cubes, uint32_t n_leaves, struct octree *tree)
 {
 	struct psr_cubes *cubes = check_in(c, 1, sizeof *cubes);
@@ -191,11 +193,11 @@ static void draw_cubes(struct check *c, struct picture *p, enum kernel kernel, u
 			level--;
 		entry[e] = (struct bin_entry){ .slot = in->first_slot + cube, .level = (uint8_t)level,
 			                           .is_wide = (uint8_t)(n_leaves == 0 ? check_below(c, 2) : p->levels != 0) };
-		entry[e].is_mixed = !(cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED) && n_leaves == 0;
+		entry[e].is_mixed = n_leaves == UNEVEN || (n_leaves == 0 && !(cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED));
 	}
 	if (kernel == RUNS)
 		t->cubes = random_runs(c, cubes, in->first_slot, entry, n_entries, n_leaves > 0);
-	check_units(c, (uint64_t)n_entries * n_leaves * (kernel == RUNS ? cubes->groups.n_blocks : 1));
+	check_units(c, n_entries * (kernel == RUNS ? tree[0].n_leaves : n_leaves));
 	while (check_next(c))
 		check_result(c, kernel_of(c->simd, kernel)(t, entry, n_entries));
 }
@@ -318,6 +320,14 @@ static void bench_runs(struct check *c)
 	draw_cubes(c, &p, RUNS, 25, 16, PLAIN);
 }
 
+static void bench_uneven_runs(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	draw_cubes(c, &p, RUNS, 25, UNEVEN, PLAIN);
+}
+
 int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
@@ -335,6 +345,7 @@ int main(int argc, char **argv)
 		{ "warp_leaves, cubes a fourth full", bench_fourths, 0, "leaf" },
 		{ "warp_leaves, these with offsets and depth level 1", bench_offsets, 0, "leaf" },
 		{ "warp_leaves, cubes a fourth full in runs", bench_runs, 0, "leaf" },
+		{ "warp_leaves, uneven cubes in runs that may face away", bench_uneven_runs, 0, "leaf" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }
