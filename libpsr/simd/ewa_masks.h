@@ -20,8 +20,8 @@
 #define EWA_BEYOND 8     /* bytes behind them that vectors may read */
 
 /* A size is for edges up to `edge` pixels, and from the one before; its masks have 2 radius + 1 pixels a side, of which
- * the middle 2 core_radius + 1 hold all cores. From one to the next edges grow by the cube root of 2; up to the first one a pixel's samples leave no pixel of a surface open,
- * see CUBES_SPACING. The others reach 1.2 edges at least. */
+ * the middle 2 core_radius + 1 hold all cores. From one to the next edges grow by the cube root of 2; up to the first
+ * one a pixel's samples leave no pixel of a surface open, see CUBES_SPACING. The others reach 1.2 edges at least. */
 struct ewa_size {
 	float edge;
 	uint32_t radius, core_radius;

@@ -11,7 +11,8 @@
 enum numbers { PLAIN, SPOILT };
 enum kernel { LEAVES, RUNS, WORDS, SUMS };
 
-/* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0 and UNEVEN: any. */
+/* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0 and
+ * UNEVEN: any. */
 static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, struct psr_cube *cube,
                         const uint32_t n[2])
 {

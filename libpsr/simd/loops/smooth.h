@@ -322,7 +322,8 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 		find_inside(is_inside, row + MARGIN, n);
 		leave_border(is_inside, t, x0, n, (uint32_t)own);
 		for (uint32_t x = 0; x < n; x += SMOOTH_RUN)
-			n_edges += smooth_run(code, x, n - x, row + MARGIN, is_inside[x / SMOOTH_RUN], t->place != NULL ? around : NULL);
+			n_edges += smooth_run(code, x, n - x, row + MARGIN, is_inside[x / SMOOTH_RUN],
+			                      t->place != NULL ? around : NULL);
 		for (size_t i = 0; i < n; i++)
 			for (size_t c = 0; c < 3; c++)
 				to[3 * i + c] = (uint8_t)code[c][i];

@@ -110,7 +110,7 @@ static void the_core_radius_is_the_least_that_holds_all_cores(void **state)
 		for (int i = 0; i < EWA_SHAPES * EWA_SECTORS * side * side; i++) {
 			const int x = abs(i % side - radius), y = abs(i / side % side - radius), at = x > y ? x : y;
 
-			if (ewa_weight[(int)ewa_size[k].first + i] >= ewa_core[(int)k * EWA_SHAPES * EWA_SECTORS + i / (side * side)])
+			if (ewa_weight[ewa_size[k].first + (uint32_t)i] >= ewa_core[ewa_number(k, 0, 0) + (uint32_t)(i / (side * side))])
 				most = at > most ? at : most;
 		}
 		assert_int_equal(ewa_size[k].core_radius, most);
