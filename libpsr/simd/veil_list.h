@@ -102,6 +102,7 @@ static inline __attribute__((always_inline)) void veil_by(list_block_fn *list_bl
 			begin_side(&veils, &corners, target, entry[e].side);
 		veils.area = entry[e].area;
 		veils.opacity = b->opacity + (block->attr - b->attr);
+		veils.n_ahead = b->n_samples - (uint64_t)(block->attr - b->attr);
 		list_block(&words, NULL, &veils, &corners, &bin, block);
 	}
 }

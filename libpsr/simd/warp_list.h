@@ -24,6 +24,7 @@ struct veils {
 	_Alignas(64) uint32_t veil[LIST + 16];
 	const float *bits;
 	const uint8_t *opacity; /* of its first sample */
+	uint64_t n_ahead;       /* samples of the model from that one on: vectors may read opacities of later blocks */
 	float area, half;       /* half: from the corner of a square to its sample */
 	int32_t side;           /* of all squares in the list */
 };

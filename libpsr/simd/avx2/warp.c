@@ -47,13 +47,14 @@ static inline __m256i quarters_of(__m256 u, __m256 v, __m256i pixel_u, __m256i p
 	                       _mm256_slli_epi32(_mm256_cvttps_epi32(_mm256_mul_ps(down, four)), 2));
 }
 
-/* The veils of a block's next samples, n or 8. */
-static inline __m256i veils_of(const struct veils *veils, int first, int n)
+/* The veils of a block's samples from `first` on. */
+static inline __m256i veils_of(const struct veils *veils, uint32_t first)
 {
+	const uint64_t n_ahead = veils->n_ahead - first;
 	uint64_t opacity = 0;
 
-	if (n < 8)
-		memcpy(&opacity, veils->opacity + first, (size_t)n);
+	if (n_ahead < 8)
+		memcpy(&opacity, veils->opacity + first, n_ahead);
 	else
 		memcpy(&opacity, veils->opacity + first, sizeof opacity);
 	const __m256i at = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)opacity));
@@ -106,7 +107,7 @@ static inline __attribute__((always_inline)) void list_block(struct words *words
 			low = _mm256_or_si256(_mm256_slli_epi32(low, PSR_PLACE_BITS), quarters_of(u, v, pixel_u, pixel_v));
 		const struct warped samples = {
 			_mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x), low, _mm256_castps_si256(z1),
-			veils != NULL ? veils_of(veils, 8 * g, n - 8 * g) : _mm256_setzero_si256()
+			veils != NULL ? veils_of(veils, 8 * (uint32_t)g) : _mm256_setzero_si256()
 		};
 		list_words(words, veils, k, &samples);
 	}
