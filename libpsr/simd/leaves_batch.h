@@ -29,7 +29,23 @@ struct run {
 	uint32_t id;                 /* of its first leaf */
 };
 
-/* Some of them, in order: their numbers in the run, and their middles in the picture. */
+/* A cube's leaves: their lanes and number, which of the tree's the first one is, and the id of lane 0. */
+struct cube_leaves {
+	uint64_t mask;
+	uint32_t n, leaf, id;
+};
+
+static inline struct cube_leaves leaves_of(const struct run *run, uint32_t number)
+{
+	const struct octree *tree = run->level->tree;
+	const uint32_t code = run->from.code + run->cube[number].code;
+	const uint64_t mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
+
+	return (struct cube_leaves){ mask, (uint32_t)__builtin_popcountll(mask), run->from.leaf + run->cube[number].leaf,
+		                         run->id + number * PSR_BLOCK_SAMPLES };
+}
+
+/* Some of a run's cubes, in order: their numbers in it, and their middles in the picture. */
 struct placed_cubes {
 	_Alignas(64) double middle[3][CUBES_RUN];
 	_Alignas(64) uint8_t number[CUBES_RUN + 8];

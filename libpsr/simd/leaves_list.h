@@ -5,20 +5,16 @@
 #include "cube.h"
 #include "warp_list.h"
 
-/* Prepares cubes, and prefetches their normals and offsets where these are needed: by points, for what faces away and to
- * move wide leaves; by splats, always. */
+/* Prepares cubes, and prefetches their normals and offsets. */
 static inline void make_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
-                              uint32_t n, int for_splats)
+                              uint32_t n)
 {
 	for (uint32_t i = 0; i < n; i++) {
 		struct warp_cube *c = &cubes[i];
 
 		warp_cube_make(c, &t->instance[entry[i].instance], entry[i].slot);
-		const int moves = c->offset != NULL && (for_splats || entry[i].is_wide);
-
-		if (for_splats || entry[i].is_mixed || moves)
-			__builtin_prefetch(c->normal);
-		if (moves)
+		__builtin_prefetch(c->normal);
+		if (c->offset != NULL)
 			__builtin_prefetch(c->offset);
 	}
 }
@@ -52,27 +48,11 @@ static inline uint32_t batch_of(uint32_t first, uint32_t n)
 
 /* Prepares the batch that begins with entry e, and fetches what later ones need. */
 static inline void next_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
-                              uint32_t e, uint32_t n, int for_splats)
+                              uint32_t e, uint32_t n)
 {
 	fetch_cubes(t, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
 	fetch_codes(t, entry + e + BLOCKS, batch_of(e + BLOCKS, n));
-	make_cubes(cubes, t, entry + e, batch_of(e, n), for_splats);
-}
-
-/* Lists the words of a cube's leaves, and their cells. */
-typedef void list_cube_fn(struct words *words, struct cells *cells, const struct warp_target *t,
-                          const struct bin_entry *entry, const struct warp_cube *cube);
-
-/* Prepares the first BLOCKS cubes of *left, or all of them, and takes them away. */
-static inline uint32_t make_run(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
-                                uint64_t *left)
-{
-	const struct warp_instance *in = &t->instance[entry->instance];
-	uint32_t n = 0;
-
-	for (; *left && n < BLOCKS; *left &= *left - 1)
-		warp_cube_make(&cubes[n++], in, entry->slot + (uint32_t)__builtin_ctzll(*left));
-	return n;
+	make_cubes(cubes, t, entry + e, batch_of(e, n));
 }
 
 /* The lists of a warp under way. */
@@ -131,29 +111,6 @@ static inline void fetch_next(const struct warp_target *t, const struct bin_entr
 		fetch_cubes(t, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
 		fetch_codes(t, entry + e + BLOCKS, batch_of(e + BLOCKS, n));
 	}
-}
-
-/* The warp, given a function that lists a cube; both lists have room for one at each call. */
-static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *list_cube,
-                                                                const struct warp_target *target,
-                                                                const struct bin_entry *entry, uint32_t n)
-{
-	struct leaves_lists lists;
-	struct warp_cube cubes[BLOCKS];
-
-	leaves_begin(&lists);
-	for (uint32_t e = 0; e < n; e++) {
-		fetch_next(target, entry, e, n);
-		for (uint64_t left = target->cubes != NULL ? target->cubes[entry[e].hit] : 1; left;) {
-			const uint32_t n_cubes = make_run(cubes, target, &entry[e], &left);
-
-			for (uint32_t i = 0; i < n_cubes; i++) {
-				make_room(&lists, target, entry[e].level);
-				list_cube(&lists.words, &lists.cells, target, &entry[e], &cubes[i]);
-			}
-		}
-	}
-	return leaves_end(&lists, target);
 }
 
 #endif

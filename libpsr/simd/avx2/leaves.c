@@ -103,11 +103,9 @@ static inline void place(struct placed_cubes *placed, const struct warp_cubes *t
 static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which)
 {
 	const struct octree *tree = run->level->tree;
-	const uint32_t number = placed->number[which];
-	const uint32_t code = run->from.code + run->cube[number].code, leaf = run->from.leaf + run->cube[number].leaf;
-	const uint64_t mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
-	const uint32_t n = (uint32_t)__builtin_popcountll(mask), begin = l->n;
-	const __m256i id = _mm256_set1_epi32((int)(run->id + number * PSR_BLOCK_SAMPLES));
+	const struct cube_leaves own = leaves_of(run, placed->number[which]);
+	const __m256i id = _mm256_set1_epi32((int)own.id);
+	const uint32_t begin = l->n;
 	const int with_normals = l->is_mixed | l->with_offsets;
 	uint8_t lane[64 + 8];
 	__m256 row[3], col[3];
@@ -116,8 +114,8 @@ static inline void list(struct leaves *l, const struct run *run, const struct pl
 		row[a] = rows_at(placed->middle[a][which], l->octants->row[a]);
 		col[a] = cols_of(l->octants, a);
 	}
-	list_samples(lane, mask);
-	for (uint32_t k = 0; k < n; k += LANES) {
+	list_samples(lane, own.mask);
+	for (uint32_t k = 0; k < own.n; k += LANES) {
 		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(lane + k)));
 		const __m256i octant = _mm256_srli_epi32(s, 3);
 		const uint32_t to = begin + k;
@@ -127,12 +125,12 @@ static inline void list(struct leaves *l, const struct run *run, const struct pl
 		store(l->id + to, _mm256_add_epi32(id, s));
 		if (!with_normals)
 			continue;
-		const uint64_t n_ahead = tree->n_leaves - leaf - k;
-		_mm_storeu_si128((__m128i *)(l->normal + to), normals_of(tree->normal + leaf + k, n_ahead));
+		const uint64_t n_ahead = tree->n_leaves - own.leaf - k;
+		_mm_storeu_si128((__m128i *)(l->normal + to), normals_of(tree->normal + own.leaf + k, n_ahead));
 		if (l->with_offsets)
-			_mm_storel_epi64((__m128i *)(l->offset + to), steps_of(tree->offset + leaf + k, n_ahead));
+			_mm_storel_epi64((__m128i *)(l->offset + to), steps_of(tree->offset + own.leaf + k, n_ahead));
 	}
-	l->n = begin + n;
+	l->n = begin + own.n;
 }
 
 static const struct leaf_vectors vectors = { LANES, place, list, draw };

@@ -270,7 +270,7 @@ static inline __attribute__((always_inline)) int ewa_fill(struct ewa_leaves *l, 
 		const struct warp_cube *cube = &r->cubes[e % BLOCKS];
 
 		if (e % BLOCKS == 0)
-			next_cubes(r->cubes, t, r->entry, e, r->n, 1);
+			next_cubes(r->cubes, t, r->entry, e, r->n);
 		const uint32_t n = (uint32_t)__builtin_popcountll(cube->mask);
 		if (l->n > 0 && (l->n + n > EWA_BATCH || in != l->in))
 			return 1;
