@@ -8,7 +8,7 @@ warp_fn warp_c, warp_avx2, warp_avx512;
 warp_fn warp_leaves_c, warp_leaves_avx2, warp_leaves_avx512;
 warp_fn ewa_words_c, ewa_words_avx2, ewa_words_avx512;
 warp_fn ewa_sums_c, ewa_sums_avx2, ewa_sums_avx512;
-warp_fn warp_points_avx512;
+warp_fn warp_points_avx2, warp_points_avx512;
 veil_fn veil_c, veil_avx2, veil_avx512;
 reproject_look_fn reproject_look_avx2;
 strip_list_fn strip_list_avx2, strip_list_avx512;

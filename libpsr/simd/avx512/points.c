@@ -67,23 +67,22 @@ static inline __attribute__((always_inline)) struct rays rays_of(const struct wa
 /* As meet_quadric() of loops/points.h: sets z', returns which lanes hit. */
 static inline __mmask16 meet(__m512 *z_out, const struct rays *p, __m512 dx, __m512 dy)
 {
-	const __m512 zero = _mm512_setzero_ps(), half = all(0.5f), two = all(2), a = p->a, c = p->c;
+	const __m512 zero = _mm512_setzero_ps(), two = all(2), a = p->a, c = p->c;
 	const __m512 su = dx * p->right[0] + dy * p->down[0], sv = dx * p->right[1] + dy * p->down[1];
 	const __m512 sn = dx * p->right[2] + dy * p->down[2];
-	const __m512 qu = p->from[0] + p->scale * su, qv = p->from[1] + p->scale * sv, qn = p->from[2] + p->scale * sn;
+	const __m512 qu = p->from[0] + p->scale * su, qv = p->from[1] + p->scale * sv;
+	const __m512 qn2 = two * p->from[2] + two * p->scale * sn;
 	const __m512 du = p->sight[0] + p->through * su, dv = p->sight[1] + p->through * sv;
 	const __m512 dn = p->sight[2] + p->through * sn, au = a * du, cv = c * dv;
-	const __m512 square = -half * (au * du + cv * dv), linear = dn - (au * qu + cv * qv);
-	const __m512 rest = qn - half * (a * (qu * qu) + c * (qv * qv));
-	const __m512 inside = linear * linear - all(4) * (square * rest);
-	const __m512 root = _mm512_sqrt_ps(_mm512_max_ps(inside, zero)); /* 0 for NaN */
+	const __m512 square = au * du + cv * dv, linear = dn - (au * qu + cv * qv);
+	const __m512 rest = qn2 - (a * (qu * qu) + c * (qv * qv));
+	const __m512 root = _mm512_sqrt_ps(linear * linear + square * rest);
 	const __mmask16 is_falling = _mm512_cmp_ps_mask(linear, zero, _CMP_LE_OQ);
-	const __m512 above = _mm512_mask_blend_ps(is_falling, -linear - root, two * rest);
-	const __m512 below = _mm512_mask_blend_ps(is_falling, two * square, root - linear);
+	const __m512 above = _mm512_mask_blend_ps(is_falling, root + linear, rest);
+	const __m512 below = _mm512_mask_blend_ps(is_falling, square, root - linear);
 	const __m512 s = above / below, z = p->z + s;
-	__mmask16 k = _mm512_cmp_ps_mask(inside, zero, _CMP_GE_OQ);
+	__mmask16 k = _mm512_cmp_ps_mask(_mm512_abs_ps(qu + s * du), p->extent[0], _CMP_LE_OQ);
 
-	k = _mm512_mask_cmp_ps_mask(k, _mm512_abs_ps(qu + s * du), p->extent[0], _CMP_LE_OQ);
 	k = _mm512_mask_cmp_ps_mask(k, _mm512_abs_ps(qv + s * dv), p->extent[1], _CMP_LE_OQ);
 	*z_out = z;
 	return _mm512_mask_cmp_ps_mask(k, z, p->near, _CMP_GT_OQ);

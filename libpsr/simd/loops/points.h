@@ -25,8 +25,9 @@ struct points_shape {
 	int32_t columns, lanes;
 };
 
-/* Meets lines of sight with the quadric, w = (a u^2 + c v^2) / 2: where its normal faces the eye, the derivative of the
- * equation along the line is below 0, which tells one root of two. x: of the centre of column 0, from the point. */
+/* Meets lines of sight with the quadric, a u^2 + c v^2 = 2 w: at place s along one, square s^2 - 2 linear s = rest. Where
+ * the quadric's normal faces the eye, the derivative along the line is below 0, which tells one root of two. No number
+ * is nowhere. x: of the centre of column 0, from the point. */
 static inline __attribute__((always_inline)) void meet_quadric(uint32_t *bits, const struct warp_target *t,
                                                                const struct points_batch *b, uint32_t of, float x,
                                                                int32_t first, int32_t y, struct points_shape shape)
@@ -43,19 +44,18 @@ static inline __attribute__((always_inline)) void meet_quadric(uint32_t *bits, c
 		const float dx = x + (float)(first + i % shape.columns), dy = (y0 + (float)(i / shape.columns)) - py;
 		const float su = dx * right[0] + dy * down[0], sv = dx * right[1] + dy * down[1];
 		const float sn = dx * right[2] + dy * down[2];
-		const float qu = from[0] + scale * su, qv = from[1] + scale * sv, qn = from[2] + scale * sn;
+		const float qu = from[0] + scale * su, qv = from[1] + scale * sv, qn2 = 2 * from[2] + 2 * scale * sn;
 		const float du = sight[0] + through * su, dv = sight[1] + through * sv, dn = sight[2] + through * sn;
 		const float au = a * du, cv = c * dv;
-		const float square = -0.5f * (au * du + cv * dv), linear = dn - (au * qu + cv * qv);
-		const float rest = qn - 0.5f * (a * (qu * qu) + c * (qv * qv));
-		const float inside = linear * linear - 4 * (square * rest);
-		const float root = __builtin_sqrtf(psr_where(inside > 0, inside));
+		const float square = au * du + cv * dv, linear = dn - (au * qu + cv * qv);
+		const float rest = qn2 - (a * (qu * qu) + c * (qv * qv));
+		const float root = __builtin_sqrtf(linear * linear + square * rest);
 		const int is_falling = linear <= 0;
-		const float above = psr_choose(is_falling, 2 * rest, -linear - root);
-		const float below = psr_choose(is_falling, root - linear, 2 * square);
+		const float above = psr_choose(is_falling, rest, root + linear);
+		const float below = psr_choose(is_falling, root - linear, square);
 		const float s = above / below, z = z0 + s;
 		const float u = qu + s * du, v = qv + s * dv;
-		const int is_hit = (inside >= 0) & (__builtin_fabsf(u) <= eu) & (__builtin_fabsf(v) <= ev) & (z > near);
+		const int is_hit = (__builtin_fabsf(u) <= eu) & (__builtin_fabsf(v) <= ev) & (z > near);
 		const uint32_t mask = 0u - (uint32_t)is_hit;
 
 		bits[i] = (psr_bits_from_float(z) & mask) | (POINTS_NONE & ~mask);

@@ -1,6 +1,6 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
  * instructions. Arguments: the name of the set, the kernels of reproject_look and smooth_places, and two macros that name
- * a kernel's variant where one is written by hand: of strips' pixels, listed and written, and of others. */
+ * a kernel's variant where one is written by hand: for AVX2 and AVX-512 (PIXELS), and for AVX-512 alone. */
 #include "average.h"
 #include "cull.h"
 #include "discs.h"
@@ -27,7 +27,7 @@
 	.warp_cells = warp_cells,                      \
 	.warp = warp_##isa,                            \
 	.warp_leaves = warp_leaves_##isa,              \
-	.warp_points = KERNEL(warp_points),            \
+	.warp_points = PIXELS(warp_points),            \
 	.ewa_words = ewa_words_##isa,                  \
 	.ewa_sums = ewa_sums_##isa,                    \
 	.veil = veil_##isa,                            \

@@ -1,0 +1,250 @@
+/* Differential points: squares of 4x4 pixels, and columns of rows of 8. */
+#include <immintrin.h>
+#include "simd/kernels.h"
+#include "simd/loops/points.h"
+
+#define INLINE static inline __attribute__((always_inline))
+
+/* Lanes of a vector are eight pixels of a row, or four of each of two, in the order that makes words of them by
+ * unpacking. */
+INLINE __m256i column_of_lane(int columns)
+{
+	return columns == 4 ? _mm256_setr_epi32(0, 1, 0, 1, 2, 3, 2, 3) : _mm256_setr_epi32(0, 1, 4, 5, 2, 3, 6, 7);
+}
+
+INLINE __m256i row_of_lane(int columns)
+{
+	return columns == 4 ? _mm256_setr_epi32(0, 0, 1, 1, 0, 0, 1, 1) : _mm256_setzero_si256();
+}
+
+INLINE __m256 all(float value)
+{
+	return _mm256_set1_ps(value);
+}
+
+INLINE __m256i all_int(int32_t value)
+{
+	return _mm256_set1_epi32(value);
+}
+
+/* Lines of sight of a point. */
+struct rays {
+	float x;
+	__m256 y, z, scale, from[3], sight[3], right[3], down[3], a, c, extent[2], near, scale2;
+};
+
+INLINE struct rays rays_of(const struct warp_target *t, const struct points_batch *b, uint32_t i)
+{
+	struct rays r;
+
+	r.x = b->x[i];
+	r.y = all(b->y[i]);
+	r.z = all(b->z[i]);
+	r.scale = all(b->scale[i]);
+	r.scale2 = all(2 * b->scale[i]);
+	for (int k = 0; k < 3; k++) {
+		r.from[k] = all((k == 2 ? 2 : 1) * b->from[k][i]);
+		r.sight[k] = all(b->sight[k][i]);
+		r.right[k] = all(b->right[k][i]);
+		r.down[k] = all(b->down[k][i]);
+	}
+	r.a = all(b->p.lambda[0][i]);
+	r.c = all(b->p.lambda[1][i]);
+	r.extent[0] = all(b->extent[0][i]);
+	r.extent[1] = all(b->extent[1][i]);
+	r.near = all(t->near_z);
+	return r;
+}
+
+/* What pixels add to a line of sight along one axis of the picture. */
+struct parts {
+	__m256 u, v, n;
+};
+
+INLINE struct parts parts_of(__m256 by, const __m256 axis[3])
+{
+	return (struct parts){ by * axis[0], by * axis[1], by * axis[2] };
+}
+
+/* first: x - x0, within POINTS_VECTOR. */
+INLINE struct parts across_of(const struct rays *p, int32_t x, int32_t first, int columns)
+{
+	const __m256 column = _mm256_cvtepi32_ps(_mm256_add_epi32(column_of_lane(columns), all_int(first)));
+
+	return parts_of(all((float)(x - first) + 0.5f - p->x) + column, p->right);
+}
+
+INLINE struct parts down_of(const struct rays *p, int32_t y, int columns)
+{
+	return parts_of((all((float)y + 0.5f) + _mm256_cvtepi32_ps(row_of_lane(columns))) - p->y, p->down);
+}
+
+INLINE __m256 through(__m256 s, int perspective)
+{
+	return perspective ? s : _mm256_mul_ps(s, _mm256_setzero_ps());
+}
+
+/* As meet_quadric() of loops/points.h: returns bits of z', and POINTS_NONE where nothing is hit or `outside` is set. */
+INLINE __m256i meet(const struct rays *p, struct parts dx, struct parts dy, __m256i outside, int perspective)
+{
+	const __m256 zero = _mm256_setzero_ps(), sign = all(-0.0f), a = p->a, c = p->c;
+	const __m256 su = dx.u + dy.u, sv = dx.v + dy.v, sn = dx.n + dy.n;
+	const __m256 qu = p->from[0] + p->scale * su, qv = p->from[1] + p->scale * sv, qn2 = p->from[2] + p->scale2 * sn;
+	const __m256 du = p->sight[0] + through(su, perspective), dv = p->sight[1] + through(sv, perspective);
+	const __m256 dn = p->sight[2] + through(sn, perspective), au = a * du, cv = c * dv;
+	const __m256 square = au * du + cv * dv, linear = dn - (au * qu + cv * qv);
+	const __m256 rest = qn2 - (a * (qu * qu) + c * (qv * qv));
+	const __m256 root = _mm256_sqrt_ps(linear * linear + square * rest);
+	const __m256 is_falling = _mm256_cmp_ps(linear, zero, _CMP_LE_OQ);
+	const __m256 above = _mm256_blendv_ps(root + linear, rest, is_falling);
+	const __m256 below = _mm256_blendv_ps(square, root - linear, is_falling);
+	const __m256 s = above / below, z = p->z + s;
+	const __m256 u = _mm256_andnot_ps(sign, qu + s * du), v = _mm256_andnot_ps(sign, qv + s * dv);
+	const __m256 beside = _mm256_or_ps(_mm256_cmp_ps(u, p->extent[0], _CMP_NLE_UQ),
+	                                   _mm256_cmp_ps(v, p->extent[1], _CMP_NLE_UQ));
+	const __m256 before = _mm256_or_ps(_mm256_cmp_ps(z, p->near, _CMP_NGT_UQ), _mm256_castsi256_ps(outside));
+	const __m256i miss = _mm256_castps_si256(_mm256_or_ps(beside, before));
+
+	return _mm256_blendv_epi8(_mm256_castps_si256(z), all_int(POINTS_NONE), miss);
+}
+
+INLINE void lower_four(uint64_t *row, __m256i word)
+{
+	const __m256i old = _mm256_loadu_si256((const __m256i *)row);
+
+	_mm256_storeu_si256((__m256i *)row, _mm256_blendv_epi8(old, word, _mm256_cmpgt_epi64(old, word)));
+}
+
+/* Of a vector that reaches beyond the tile. */
+static inline void lower_some(uint64_t *at, uint32_t stride, __m256i bits, uint32_t id, int columns)
+{
+	_Alignas(32) uint32_t z[8], x[8], y[8];
+
+	_mm256_store_si256((__m256i *)z, bits);
+	_mm256_store_si256((__m256i *)x, column_of_lane(columns));
+	_mm256_store_si256((__m256i *)y, row_of_lane(columns));
+	for (int i = 0; i < 8; i++) {
+		uint64_t *to = at + (size_t)y[i] * stride + x[i];
+		const uint64_t word = (uint64_t)z[i] << 32 | id;
+
+		if (z[i] != POINTS_NONE)
+			*to = word < *to ? word : *to;
+	}
+}
+
+/* What is drawn of a point. */
+struct drawing {
+	struct rays rays;
+	__m256i id;
+	int32_t x1, y1, tile_x1, tile_y1;
+	uint32_t stride;
+	uintptr_t origin; /* the word of pixel (0, 0), wherever that is */
+};
+
+INLINE struct drawing drawing_of(const struct warp_target *t, const struct points_batch *b, uint32_t i)
+{
+	const uintptr_t before = ((uintptr_t)t->y0 * t->stride + (uintptr_t)t->x0) * sizeof *t->word;
+
+	return (struct drawing){ rays_of(t, b, i), all_int((int32_t)b->id[i]), b->x1[i], b->y1[i], t->x1, t->y1,
+		                     t->stride, (uintptr_t)t->word - before };
+}
+
+INLINE void lower(const struct drawing *d, int32_t x, int32_t y, __m256i bits, int columns)
+{
+	uint64_t *at = (uint64_t *)(d->origin + ((uintptr_t)y * d->stride + (uintptr_t)x) * sizeof *at);
+
+	if ((x + columns > d->tile_x1) | (y + 8 / columns > d->tile_y1)) {
+		lower_some(at, d->stride, bits, (uint32_t)_mm256_extract_epi32(d->id, 0), columns);
+		return;
+	}
+	lower_four(at, _mm256_unpacklo_epi32(d->id, bits));
+	lower_four(columns == 4 ? at + d->stride : at + 4, _mm256_unpackhi_epi32(d->id, bits));
+}
+
+/* Four rows, of two vectors. */
+struct four_rows {
+	struct parts down[2];
+	__m256i below[2]; /* the point's bounds */
+};
+
+INLINE struct four_rows four_rows_of(const struct drawing *d, int32_t y)
+{
+	const __m256i row = row_of_lane(4);
+
+	return (struct four_rows){ { down_of(&d->rays, y, 4), down_of(&d->rays, y + 2, 4) },
+		                       { _mm256_cmpgt_epi32(row, all_int(d->y1 - y - 1)),
+		                         _mm256_cmpgt_epi32(row, all_int(d->y1 - y - 3)) } };
+}
+
+INLINE void draw_square(const struct drawing *d, const struct four_rows *rows, struct parts across, int32_t x, int32_t y,
+                        int perspective)
+{
+	const __m256i beside = _mm256_cmpgt_epi32(column_of_lane(4), all_int(d->x1 - x - 1));
+
+	for (int k = 0; k < 2 && y + 2 * k < d->y1; k++) {
+		const __m256i outside = _mm256_or_si256(beside, rows->below[k]);
+
+		lower(d, x, y + 2 * k, meet(&d->rays, across, rows->down[k], outside, perspective), 4);
+	}
+}
+
+INLINE void draw_narrow(const struct drawing *d, int32_t x, int32_t y0, int perspective)
+{
+	const struct parts across = across_of(&d->rays, x, 0, 4);
+
+	for (int32_t y = y0; y < d->y1; y += 4) {
+		const struct four_rows rows = four_rows_of(d, y);
+
+		draw_square(d, &rows, across, x, y, perspective);
+	}
+}
+
+INLINE void draw_wide(const struct drawing *d, int32_t x0, int32_t y0, int perspective)
+{
+	for (int32_t x = x0; x < d->x1; x += 8) {
+		const struct parts across = across_of(&d->rays, x, (x - x0) % POINTS_VECTOR, 8);
+		const __m256i beside = _mm256_cmpgt_epi32(column_of_lane(8), all_int(d->x1 - x - 1));
+
+		for (int32_t y = y0; y < d->y1; y++)
+			lower(d, x, y, meet(&d->rays, across, down_of(&d->rays, y, 8), beside, perspective), 8);
+	}
+}
+
+INLINE void draw_spans_avx2(const struct drawing *d, int32_t x0, int32_t y0, const struct points_spans *spans,
+                            int perspective)
+{
+	for (int32_t y = y0, s = 0; y < d->y1; y += SPANS_ROWS, s++) {
+		const struct four_rows rows = four_rows_of(d, y);
+
+		for (int32_t x = x0 + (spans->x0[s] - x0) / 4 * 4; x < spans->x1[s]; x += 4)
+			draw_square(d, &rows, across_of(&d->rays, x, (x - x0) % POINTS_VECTOR, 4), x, y, perspective);
+	}
+}
+
+INLINE void draw_by(const struct warp_target *t, const struct points_batch *b, uint32_t i,
+                    const struct points_spans *spans, int perspective)
+{
+	const struct drawing d = drawing_of(t, b, i);
+	const int32_t x0 = b->x0[i], y0 = b->y0[i];
+
+	if (spans != NULL)
+		draw_spans_avx2(&d, x0, y0, spans, perspective);
+	else if (d.x1 - x0 <= 4)
+		draw_narrow(&d, x0, y0, perspective);
+	else
+		draw_wide(&d, x0, y0, perspective);
+}
+
+static void draw_point_avx2(const struct warp_target *t, const struct points_batch *b, uint32_t i,
+                            const struct points_spans *spans)
+{
+	if (t->perspective)
+		draw_by(t, b, i, spans, 1);
+	else
+		draw_by(t, b, i, spans, 0);
+}
+
+uint64_t warp_points_avx2(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	return warp_points_by(draw_point_avx2, NULL, t, entry, n);
+}
