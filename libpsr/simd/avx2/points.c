@@ -84,28 +84,66 @@ INLINE __m256 through(__m256 s, int perspective)
 	return perspective ? s : _mm256_mul_ps(s, _mm256_setzero_ps());
 }
 
-/* As meet_quadric() of loops/points.h: returns bits of z', and POINTS_NONE where nothing is hit or `outside` is set. */
-INLINE __m256i meet(const struct rays *p, struct parts dx, struct parts dy, __m256i outside, int perspective)
+/* A vector's equations: at place s along a line, square s^2 - 2 linear s = rest; q and d of u and v lead there. */
+struct equations {
+	__m256 qu, qv, du, dv, square, linear, rest, inside;
+};
+
+INLINE struct equations equations_of(const struct rays *p, struct parts dx, struct parts dy, int perspective)
 {
-	const __m256 zero = _mm256_setzero_ps(), sign = all(-0.0f), a = p->a, c = p->c;
-	const __m256 su = dx.u + dy.u, sv = dx.v + dy.v, sn = dx.n + dy.n;
+	const __m256 a = p->a, c = p->c, su = dx.u + dy.u, sv = dx.v + dy.v, sn = dx.n + dy.n;
 	const __m256 qu = p->from[0] + p->scale * su, qv = p->from[1] + p->scale * sv, qn2 = p->from[2] + p->scale2 * sn;
 	const __m256 du = p->sight[0] + through(su, perspective), dv = p->sight[1] + through(sv, perspective);
 	const __m256 dn = p->sight[2] + through(sn, perspective), au = a * du, cv = c * dv;
 	const __m256 square = au * du + cv * dv, linear = dn - (au * qu + cv * qv);
-	const __m256 rest = qn2 - (a * (qu * qu) + c * (qv * qv));
-	const __m256 root = _mm256_sqrt_ps(linear * linear + square * rest);
-	const __m256 is_falling = _mm256_cmp_ps(linear, zero, _CMP_LE_OQ);
-	const __m256 above = _mm256_blendv_ps(root + linear, rest, is_falling);
-	const __m256 below = _mm256_blendv_ps(square, root - linear, is_falling);
-	const __m256 s = above / below, z = p->z + s;
-	const __m256 u = _mm256_andnot_ps(sign, qu + s * du), v = _mm256_andnot_ps(sign, qv + s * dv);
+	const __m256 rest = qn2 - (a * (qu * qu) + c * (qv * qv)), inside = linear * linear + square * rest;
+
+	return (struct equations){ qu, qv, du, dv, square, linear, rest, inside };
+}
+
+INLINE __m256 solve(const struct equations *e, __m256 root)
+{
+	const __m256 is_falling = _mm256_cmp_ps(e->linear, _mm256_setzero_ps(), _CMP_LE_OQ);
+	const __m256 above = _mm256_blendv_ps(root + e->linear, e->rest, is_falling);
+	const __m256 below = _mm256_blendv_ps(e->square, root - e->linear, is_falling);
+
+	return above / below;
+}
+
+/* Returns bits of z', and POINTS_NONE where nothing is hit or `outside` is set. */
+INLINE __m256i place(const struct rays *p, const struct equations *e, __m256 s, __m256i outside)
+{
+	const __m256 sign = all(-0.0f), z = p->z + s;
+	const __m256 u = _mm256_andnot_ps(sign, e->qu + s * e->du), v = _mm256_andnot_ps(sign, e->qv + s * e->dv);
 	const __m256 beside = _mm256_or_ps(_mm256_cmp_ps(u, p->extent[0], _CMP_NLE_UQ),
 	                                   _mm256_cmp_ps(v, p->extent[1], _CMP_NLE_UQ));
 	const __m256 before = _mm256_or_ps(_mm256_cmp_ps(z, p->near, _CMP_NGT_UQ), _mm256_castsi256_ps(outside));
 	const __m256i miss = _mm256_castps_si256(_mm256_or_ps(beside, before));
 
 	return _mm256_blendv_epi8(_mm256_castps_si256(z), all_int(POINTS_NONE), miss);
+}
+
+/* Has compilers keep the order, so that the processor finds work of one vector while the other one waits. */
+INLINE void in_order(__m256 *value, __m256 *other)
+{
+	__asm__("" : "+x"(*value), "+x"(*other));
+}
+
+/* As meet_quadric() of loops/points.h, of two vectors. */
+INLINE void meet(__m256i bits[2], const struct rays *p, const struct parts dx[2], const struct parts dy[2],
+                 const __m256i outside[2], int perspective)
+{
+	const struct equations e = equations_of(p, dx[0], dy[0], perspective), f = equations_of(p, dx[1], dy[1], perspective);
+	__m256 r0 = e.inside, r1 = f.inside;
+
+	in_order(&r0, &r1);
+	r0 = _mm256_sqrt_ps(r0);
+	r1 = _mm256_sqrt_ps(r1);
+	in_order(&r0, &r1);
+	__m256 s0 = solve(&e, r0), s1 = solve(&f, r1);
+	in_order(&s0, &s1);
+	bits[0] = place(p, &e, s0, outside[0]);
+	bits[1] = place(p, &f, s1, outside[1]);
 }
 
 INLINE void lower_four(uint64_t *row, __m256i word)
@@ -180,12 +218,13 @@ INLINE void draw_square(const struct drawing *d, const struct four_rows *rows, s
                         int perspective)
 {
 	const __m256i beside = _mm256_cmpgt_epi32(column_of_lane(4), all_int(d->x1 - x - 1));
+	const __m256i outside[2] = { _mm256_or_si256(beside, rows->below[0]), _mm256_or_si256(beside, rows->below[1]) };
+	__m256i bits[2];
 
-	for (int k = 0; k < 2 && y + 2 * k < d->y1; k++) {
-		const __m256i outside = _mm256_or_si256(beside, rows->below[k]);
-
-		lower(d, x, y + 2 * k, meet(&d->rays, across, rows->down[k], outside, perspective), 4);
-	}
+	meet(bits, &d->rays, (const struct parts[2]){ across, across }, rows->down, outside, perspective);
+	lower(d, x, y, bits[0], 4);
+	if (y + 2 < d->y1)
+		lower(d, x, y + 2, bits[1], 4);
 }
 
 INLINE void draw_narrow(const struct drawing *d, int32_t x, int32_t y0, int perspective)
@@ -199,24 +238,36 @@ INLINE void draw_narrow(const struct drawing *d, int32_t x, int32_t y0, int pers
 	}
 }
 
-INLINE void draw_wide(const struct drawing *d, int32_t x0, int32_t y0, int perspective)
+/* Pairs of rows of eight. */
+INLINE void draw_rows(const struct drawing *d, int32_t x0, int32_t y0, int perspective)
 {
 	for (int32_t x = x0; x < d->x1; x += 8) {
 		const struct parts across = across_of(&d->rays, x, (x - x0) % POINTS_VECTOR, 8);
 		const __m256i beside = _mm256_cmpgt_epi32(column_of_lane(8), all_int(d->x1 - x - 1));
 
-		for (int32_t y = y0; y < d->y1; y++)
-			lower(d, x, y, meet(&d->rays, across, down_of(&d->rays, y, 8), beside, perspective), 8);
+		for (int32_t y = y0; y < d->y1; y += 2) {
+			const struct parts down[2] = { down_of(&d->rays, y, 8), down_of(&d->rays, y + 1, 8) };
+			__m256i bits[2];
+
+			meet(bits, &d->rays, (const struct parts[2]){ across, across }, down, (const __m256i[2]){ beside, beside },
+			     perspective);
+			lower(d, x, y, bits[0], 8);
+			if (y + 1 < d->y1)
+				lower(d, x, y + 1, bits[1], 8);
+		}
 	}
 }
 
-INLINE void draw_spans_avx2(const struct drawing *d, int32_t x0, int32_t y0, const struct points_spans *spans,
+INLINE void draw_squares(const struct drawing *d, int32_t x0, int32_t y0, const struct points_spans *spans,
                             int perspective)
 {
 	for (int32_t y = y0, s = 0; y < d->y1; y += SPANS_ROWS, s++) {
 		const struct four_rows rows = four_rows_of(d, y);
 
-		for (int32_t x = x0 + (spans->x0[s] - x0) / 4 * 4; x < spans->x1[s]; x += 4)
+		const int32_t begin = spans != NULL ? x0 + (spans->x0[s] - x0) / 4 * 4 : x0;
+		const int32_t end = spans != NULL ? spans->x1[s] : d->x1;
+
+		for (int32_t x = begin; x < end; x += 4)
 			draw_square(d, &rows, across_of(&d->rays, x, (x - x0) % POINTS_VECTOR, 4), x, y, perspective);
 	}
 }
@@ -227,12 +278,14 @@ INLINE void draw_by(const struct warp_target *t, const struct points_batch *b, u
 	const struct drawing d = drawing_of(t, b, i);
 	const int32_t x0 = b->x0[i], y0 = b->y0[i];
 
-	if (spans != NULL)
-		draw_spans_avx2(&d, x0, y0, spans, perspective);
-	else if (d.x1 - x0 <= 4)
+	const int32_t width = d.x1 - x0, height = d.y1 - y0;
+
+	if (spans == NULL && width <= 4)
 		draw_narrow(&d, x0, y0, perspective);
+	else if (spans == NULL && (width + 7) / 8 * ((height + 1) / 2) <= (width + 3) / 4 * ((height + 3) / 4))
+		draw_rows(&d, x0, y0, perspective);
 	else
-		draw_wide(&d, x0, y0, perspective);
+		draw_squares(&d, x0, y0, spans, perspective);
 }
 
 static void draw_point_avx2(const struct warp_target *t, const struct points_batch *b, uint32_t i,

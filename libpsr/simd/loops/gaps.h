@@ -60,7 +60,10 @@ static inline int32_t may_have_pinholes(const int32_t *weight, const struct gaps
 	return is_near;
 }
 
-static uint32_t guard_row(int32_t *weight, const struct gaps_target *t, const struct gaps_tile *tile, uint32_t y)
+/* Takes pinholes, then lists slits. Where no pixel may be in a slit, none is a pinhole: of neighbours on rows and
+ * columns a pinhole has two before it. */
+static uint32_t guard_row(struct gaps_counts *counts, int32_t *weight, const struct gaps_target *t,
+                          const struct gaps_tile *tile, uint32_t y)
 {
 	uint32_t n_pinholes = 0;
 
@@ -69,11 +72,19 @@ static uint32_t guard_row(int32_t *weight, const struct gaps_target *t, const st
 	for (uint32_t x = 0; x < tile->width; x += GUARD_RUN) {
 		const float *above = gaps_row(tile, (int32_t)y - 1) + x, *own = above + GAPS_STRIDE, *below = own + GAPS_STRIDE;
 
+		if (t->slit != NULL && !may_have_slits(weight + x, t, own))
+			continue;
 		if (may_have_pinholes(weight + x, t, above, own, below))
 			n_pinholes += guard_run(weight + x, t, above, own, below);
+		if (t->slit != NULL)
+			counts->n_slits += list_slits(t->slit + counts->n_slits, weight + x, t, own, tile->width - x,
+			                              y * GAPS_WIDTH + x);
 	}
+	counts->n_pinholes += n_pinholes;
 	return n_pinholes;
 }
+
+_Static_assert(SLIT_RUN == GUARD_RUN, "runs are tested together");
 
 static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1,
                                uint8_t *marks)
@@ -106,14 +117,13 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 			if (t->stack->levels >> k & 1)
 				is_less |= t->method == PSR_GAPS_OPAQUE ? cover_opaque(weight, t, &tile, k, y)
 				                                        : cover_level(weight, &level[k], t, &tile, y);
-		const uint32_t n_pinholes = guard_row(weight, t, &tile, y);
-		counts.n_pinholes += n_pinholes;
-		if (t->slit != NULL)
-			counts.n_slits += list_slits(t->slit + counts.n_slits, weight, t, &tile, y);
+		if (!guard_row(&counts, weight, t, &tile, y) && !is_less) {
+			for (uint32_t x = 0; x < tile.width; x++)
+				to[x] = GAPS_WHOLE;
+			continue;
+		}
 		for (uint32_t x = 0; x < tile.width; x++)
 			to[x] = (uint16_t)weight[x];
-		if (!is_less && !n_pinholes)
-			continue;
 		for (uint32_t x = 0; x < tile.width; x++) {
 			const int32_t is_partial = weight[x] < GAPS_WHOLE;
 

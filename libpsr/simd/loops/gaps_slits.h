@@ -36,23 +36,16 @@ static inline void count_before(int32_t *n_before, const struct gaps_target *t, 
 	}
 }
 
-static uint32_t list_slits(uint16_t *slit, const int32_t *weight, const struct gaps_target *t,
-                           const struct gaps_tile *tile, uint32_t y)
+/* Of SLIT_RUN pixels, at most n of which are of the piece; `at`: of the first in t->slit. */
+static uint32_t list_slits(uint16_t *slit, const int32_t *weight, const struct gaps_target *t, const float *own,
+                           uint32_t n, uint32_t at)
 {
-	uint32_t n = 0;
+	int32_t n_before[SLIT_RUN];
+	uint32_t n_slits = 0;
 
-	if (!(tile->has_samples[GAPS_MARGIN + y - 1] | tile->has_samples[GAPS_MARGIN + y + 1]))
-		return 0;
-	for (uint32_t x = 0; x < tile->width; x += SLIT_RUN) {
-		const float *own = gaps_row(tile, (int32_t)y) + x;
-		int32_t n_before[SLIT_RUN];
-
-		if (!may_have_slits(weight + x, t, own))
-			continue;
-		count_before(n_before, t, own);
-		for (uint32_t i = 0; i < SLIT_RUN && x + i < tile->width; i++)
-			if (n_before[i] >= SLIT_SIDES && weight[x + i] > 0)
-				slit[n++] = (uint16_t)(y * GAPS_WIDTH + x + i);
-	}
-	return n;
+	count_before(n_before, t, own);
+	for (uint32_t i = 0; i < SLIT_RUN && i < n; i++)
+		if (n_before[i] >= SLIT_SIDES && weight[i] > 0)
+			slit[n_slits++] = (uint16_t)(at + i);
+	return n_slits;
 }
