@@ -6,7 +6,8 @@
 #include "leaves_list.h"
 
 #define BATCH 192 /* leaves: those of some twelve cubes, and what is known of them stays in L1 */
-#define ROOM (BATCH + PSR_BLOCK_SAMPLES + 16)
+#define CUBES 8   /* that are listed at once */
+#define ROOM (BATCH + CUBES * PSR_BLOCK_SAMPLES + 16)
 
 /* Leaves of which all but their offsets is known of their places. */
 struct leaves {
@@ -29,20 +30,17 @@ struct run {
 	uint32_t id;                 /* of its first leaf */
 };
 
-/* A cube's leaves: their lanes and number, which of the tree's the first one is, and the id of lane 0. */
-struct cube_leaves {
-	uint64_t mask;
-	uint32_t n, leaf, id;
+/* A cube of a run: its code and first leaf in the tree, and the id of lane 0. */
+struct cube_at {
+	uint32_t code, leaf, id;
 };
 
-static inline struct cube_leaves leaves_of(const struct run *run, uint32_t number)
+static inline struct cube_at cube_at(const struct run *run, uint32_t number)
 {
-	const struct octree *tree = run->level->tree;
-	const uint32_t code = run->from.code + run->cube[number].code;
-	const uint64_t mask = warp_cube_mask(psr_cubes_children(tree, code), tree->code[code]);
+	const struct psr_cube *cube = &run->cube[number];
 
-	return (struct cube_leaves){ mask, (uint32_t)__builtin_popcountll(mask), run->from.leaf + run->cube[number].leaf,
-		                         run->id + number * PSR_BLOCK_SAMPLES };
+	return (struct cube_at){ run->from.code + cube->code, run->from.leaf + cube->leaf,
+		                     run->id + number * PSR_BLOCK_SAMPLES };
 }
 
 /* Some of a run's cubes, in order: their numbers in it, and their middles in the picture. */
@@ -56,8 +54,8 @@ struct leaf_vectors {
 	uint32_t lanes;
 	/* Lists the cubes of a mask, and computes their middles. */
 	void (*place)(struct placed_cubes *placed, const struct warp_cubes *to, const struct run *run, uint64_t cubes);
-	/* Puts the leaves of one of them, `which`, behind the others. */
-	void (*list)(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which);
+	/* Puts the leaves of n of them, CUBES at most, from `first` on behind the others. */
+	void (*list)(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t first, uint32_t n);
 	/* Lists the words and cells of n leaves from leaf i on, or of as many as there are lanes. */
 	void (*draw)(struct leaves_lists *to, const struct leaves *l, const struct warp_target *t, uint32_t i, uint32_t n);
 };
@@ -103,6 +101,7 @@ static inline __attribute__((always_inline)) void list_run(struct leaf_vectors b
 		                     entry->slot * PSR_BLOCK_SAMPLES };
 	const struct warp_octants *octants = &in->cubes->level[level - model->level];
 	const int with_offsets = entry->is_wide && level->tree->offset != NULL && level->tree->normal != NULL;
+	const uint32_t n_cubes = (uint32_t)__builtin_popcountll(cubes);
 	struct placed_cubes placed;
 
 	if (octants != l->octants || entry->level != l->level || entry->is_mixed != l->is_mixed
@@ -116,8 +115,8 @@ static inline __attribute__((always_inline)) void list_run(struct leaf_vectors b
 		l->with_offsets = with_offsets;
 	}
 	by.place(&placed, in->cubes, &run, cubes);
-	for (uint32_t i = 0; i < (uint32_t)__builtin_popcountll(cubes); i++) {
-		by.list(l, &run, &placed, i);
+	for (uint32_t i = 0; i < n_cubes; i += CUBES) {
+		by.list(l, &run, &placed, i, n_cubes - i < CUBES ? n_cubes - i : CUBES);
 		if (l->n > BATCH)
 			draw_most(by, to, l, t);
 	}

@@ -100,37 +100,93 @@ static inline void place(struct placed_cubes *placed, const struct warp_cubes *t
 	}
 }
 
-static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which)
+/* Octants of cubes that have leaves: which of the cubes' there are, eight a cube, and their codes. Of a cube's lists of
+ * eight, what is behind its last octant gives way to the next cube's. */
+struct octants {
+	uint8_t at[CUBES * 8 + 8], code[CUBES * 8 + 8];
+	uint32_t n;
+};
+
+/* What octants take from their cubes: the terms of their places and their first ids, and how far the cube's leaves in
+ * the tree are ahead of those in the list. */
+struct listed_cubes {
+	_Alignas(32) float row[3][CUBES * 8];
+	_Alignas(32) uint32_t id[CUBES * 8];
+	int64_t ahead[CUBES];
+};
+
+static inline void list_octants(struct octants *o, struct listed_cubes *to, const struct leaves *l, const struct run *run,
+                                const struct placed_cubes *placed, uint32_t first, uint32_t n)
 {
 	const struct octree *tree = run->level->tree;
-	const struct cube_leaves own = leaves_of(run, placed->number[which]);
-	const __m256i id = _mm256_set1_epi32((int)own.id);
-	const uint32_t begin = l->n;
-	const int with_normals = l->is_mixed | l->with_offsets;
-	uint8_t lane[64 + 8];
-	__m256 row[3], col[3];
+	const __m256i ids = _mm256_setr_epi32(0, 8, 16, 24, 32, 40, 48, 56);
+	uint32_t n_leaves = l->n;
 
-	for (int a = 0; a < 3; a++) {
-		row[a] = rows_at(placed->middle[a][which], l->octants->row[a]);
-		col[a] = cols_of(l->octants, a);
-	}
-	list_samples(lane, own.mask);
-	for (uint32_t k = 0; k < own.n; k += LANES) {
-		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(lane + k)));
-		const __m256i octant = _mm256_srli_epi32(s, 3);
-		const uint32_t to = begin + k;
+	o->n = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		const struct cube_at at = cube_at(run, placed->number[first + i]);
+		const uint8_t code = tree->code[at.code];
+		const uint64_t octants = front_lanes(code) + 8 * i * UINT64_C(0x0101010101010101);
+		const uint64_t children = psr_cubes_children(tree, at.code);
+		const uint32_t n_octants = (uint32_t)__builtin_popcount(code);
 
+		memcpy(o->at + o->n, &octants, sizeof octants);
+		memcpy(o->code + o->n, &children, sizeof children);
+		o->n += n_octants;
 		for (int a = 0; a < 3; a++)
-			_mm256_storeu_ps(l->at[a] + to, axis_of(row[a], col[a], octant, s));
-		store(l->id + to, _mm256_add_epi32(id, s));
-		if (!with_normals)
-			continue;
-		const uint64_t n_ahead = tree->n_leaves - own.leaf - k;
-		_mm_storeu_si128((__m128i *)(l->normal + to), normals_of(tree->normal + own.leaf + k, n_ahead));
-		if (l->with_offsets)
-			_mm_storel_epi64((__m128i *)(l->offset + to), steps_of(tree->offset + own.leaf + k, n_ahead));
+			_mm256_store_ps(to->row[a] + 8 * i, rows_at(placed->middle[a][first + i], l->octants->row[a]));
+		store(to->id + 8 * i, _mm256_add_epi32(_mm256_set1_epi32((int)at.id), ids));
+		to->ahead[i] = (int64_t)at.leaf - n_leaves;
+		n_leaves += (uint32_t)__builtin_popcountll(_bzhi_u64(children, 8 * n_octants));
 	}
-	l->n = begin + own.n;
+}
+
+/* By octants, of which each knows its place but for its leaves'. */
+static inline __attribute__((always_inline)) void list_by(struct leaves *l, const struct octants *octants,
+                                                          const struct listed_cubes *cubes, const struct octree *tree,
+                                                          int with_normals, int with_offsets)
+{
+	uint32_t to = l->n;
+	__m256 col[3];
+
+	for (int a = 0; a < 3; a++)
+		col[a] = cols_of(l->octants, a);
+	for (uint32_t i = 0; i < octants->n; i++) {
+		const uint32_t at = octants->at[i], code = octants->code[i];
+		const __m256i front = front_of(code);
+
+		for (int a = 0; a < 3; a++) {
+			const __m256 leaves = _mm256_add_ps(_mm256_set1_ps(cubes->row[a][at]), col[a]);
+
+			_mm256_storeu_ps(l->at[a] + to, _mm256_permutevar8x32_ps(leaves, front));
+		}
+		store(l->id + to, _mm256_add_epi32(_mm256_set1_epi32((int)cubes->id[at]), front));
+		if (with_normals) {
+			const uint64_t leaf = (uint64_t)(cubes->ahead[at / 8] + to), n_ahead = tree->n_leaves - leaf;
+
+			_mm_storeu_si128((__m128i *)(l->normal + to), normals_of(tree->normal + leaf, n_ahead));
+			if (with_offsets)
+				_mm_storel_epi64((__m128i *)(l->offset + to), steps_of(tree->offset + leaf, n_ahead));
+		}
+		to += (uint32_t)__builtin_popcount(code);
+	}
+	l->n = to;
+}
+
+static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t first,
+                        uint32_t n)
+{
+	const struct octree *tree = run->level->tree;
+	struct listed_cubes cubes;
+	struct octants octants;
+
+	list_octants(&octants, &cubes, l, run, placed, first, n);
+	if (l->with_offsets)
+		list_by(l, &octants, &cubes, tree, 1, 1);
+	else if (l->is_mixed)
+		list_by(l, &octants, &cubes, tree, 1, 0);
+	else
+		list_by(l, &octants, &cubes, tree, 0, 0);
 }
 
 static const struct leaf_vectors vectors = { LANES, place, list, draw };

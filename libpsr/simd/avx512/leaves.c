@@ -74,12 +74,13 @@ static inline void place(struct placed_cubes *placed, const struct warp_cubes *t
 	}
 }
 
-static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which)
+static inline void list_cube(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t which)
 {
 	const struct octree *tree = run->level->tree;
-	const struct cube_leaves own = leaves_of(run, placed->number[which]);
-	const __m512i id = _mm512_set1_epi32((int)own.id);
-	const uint32_t begin = l->n;
+	const struct cube_at at = cube_at(run, placed->number[which]);
+	const uint64_t mask = warp_cube_mask(psr_cubes_children(tree, at.code), tree->code[at.code]);
+	const uint32_t n = (uint32_t)__builtin_popcountll(mask), begin = l->n;
+	const __m512i id = _mm512_set1_epi32((int)at.id);
 	const int with_normals = l->is_mixed | l->with_offsets;
 	_Alignas(64) uint8_t lane[64];
 	__m512 row[3], col[3];
@@ -88,8 +89,8 @@ static inline void list(struct leaves *l, const struct run *run, const struct pl
 		row[a] = rows_at(placed->middle[a][which], l->octants->row[a]);
 		col[a] = cols_of(l->octants, a);
 	}
-	list_lanes(lane, own.mask);
-	for (uint32_t k = 0; k < own.n; k += LANES) {
+	list_lanes(lane, mask);
+	for (uint32_t k = 0; k < n; k += LANES) {
 		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(lane + k)));
 		const __m512i octant = _mm512_srli_epi32(s, 3);
 		const uint32_t to = begin + k;
@@ -99,12 +100,19 @@ static inline void list(struct leaves *l, const struct run *run, const struct pl
 		_mm512_storeu_si512(l->id + to, _mm512_add_epi32(id, s));
 		if (!with_normals)
 			continue;
-		const __mmask16 valid = (__mmask16)_bzhi_u32(0xffff, own.n - k);
-		_mm256_storeu_si256((__m256i *)(l->normal + to), _mm256_maskz_loadu_epi16(valid, tree->normal + own.leaf + k));
+		const __mmask16 valid = (__mmask16)_bzhi_u32(0xffff, n - k);
+		_mm256_storeu_si256((__m256i *)(l->normal + to), _mm256_maskz_loadu_epi16(valid, tree->normal + at.leaf + k));
 		if (l->with_offsets)
-			_mm_storeu_si128((__m128i *)(l->offset + to), _mm_maskz_loadu_epi8(valid, tree->offset + own.leaf + k));
+			_mm_storeu_si128((__m128i *)(l->offset + to), _mm_maskz_loadu_epi8(valid, tree->offset + at.leaf + k));
 	}
-	l->n = begin + own.n;
+	l->n = begin + n;
+}
+
+static inline void list(struct leaves *l, const struct run *run, const struct placed_cubes *placed, uint32_t first,
+                        uint32_t n)
+{
+	for (uint32_t i = first; i < first + n; i++)
+		list_cube(l, run, placed, i);
 }
 
 static const struct leaf_vectors vectors = { LANES, place, list, draw };
