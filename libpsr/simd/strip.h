@@ -26,6 +26,7 @@ struct strip_pixels {
 	const struct octree *tree[STRIP];
 	uint32_t leaf[STRIP];
 	int has_leaves;                     /* an element of `at` is NULL */
+	int only_points;                    /* all are of differential points, whose normals are not those of attributes */
 	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
 	uint32_t has_cones;   /* a sample's block is bent; with STRIP_BENT, where the surface's normal is needed */
 	uint32_t cone[STRIP]; /* then, of bent blocks: x, y, z and sine, from the lowest byte on; else STRIP_NO_CONE */

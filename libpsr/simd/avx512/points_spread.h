@@ -6,12 +6,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
-static inline void points_spread_avx512(float *to, const float *from, const uint32_t *run, uint32_t first, uint32_t end)
+static inline __attribute__((always_inline)) void points_spread_avx512(float *const *to, const float *const *from,
+                                                                       const uint32_t *run, uint32_t first,
+                                                                       uint32_t end)
 {
 	for (uint32_t i = first; i < end; i += 16) {
-		const __m512i at = _mm512_sub_epi32(_mm512_loadu_si512(run + i), _mm512_set1_epi32((int)run[i]));
+		const uint32_t begin = run[i];
+		const __m512i at = _mm512_sub_epi32(_mm512_loadu_si512(run + i), _mm512_set1_epi32((int)begin));
 
-		_mm512_storeu_ps(to + i, _mm512_permutexvar_ps(at, _mm512_loadu_ps(from + run[i])));
+#pragma GCC unroll 14
+		for (int k = 0; k < 14; k++)
+			_mm512_storeu_ps(to[k] + i, _mm512_permutexvar_ps(at, _mm512_loadu_ps(from[k] + begin)));
 	}
 }
 

@@ -59,12 +59,16 @@ static inline void list_runs(struct points_runs *to, const struct strip_pixels *
 			to->begin[c][r] -= to->p.at[c][r];
 }
 
-/* Sets values of pixels to those of their runs. Sets of instructions may have a way of their own, which may write
- * POINTS_VECTOR values beyond. */
-static inline void points_spread(float *to, const float *from, const uint32_t *run, uint32_t first, uint32_t end)
+#define POINTS_LISTS 14 /* of what is spread */
+
+/* Sets values of pixels to those of their runs, list by list. Sets of instructions may have a way of their own, which
+ * may write POINTS_VECTOR values beyond. */
+static inline void points_spread(float *const to[POINTS_LISTS], const float *const from[POINTS_LISTS],
+                                 const uint32_t *run, uint32_t first, uint32_t end)
 {
-	for (uint32_t i = first; i < end; i++)
-		to[i] = from[run[i]];
+	for (int k = 0; k < POINTS_LISTS; k++)
+		for (uint32_t i = first; i < end; i++)
+			to[k][i] = from[k][run[i]];
 }
 
 #ifndef POINTS_SPREAD
@@ -73,13 +77,23 @@ static inline void points_spread(float *to, const float *from, const uint32_t *r
 
 static inline void spread_runs(struct points_runs *runs, uint32_t first, uint32_t end)
 {
+	float *to[POINTS_LISTS];
+	const float *from[POINTS_LISTS];
+	int n = 0;
+
 	for (int k = 0; k < 3; k++) {
-		POINTS_SPREAD(runs->at[k], runs->begin[k], runs->run, first, end);
-		for (int c = 0; c < 3; c++)
-			POINTS_SPREAD(runs->axis[k][c], runs->p.axis[k][c], runs->run, first, end);
+		to[n] = runs->at[k];
+		from[n++] = runs->begin[k];
+		for (int c = 0; c < 3; c++) {
+			to[n] = runs->axis[k][c];
+			from[n++] = runs->p.axis[k][c];
+		}
 	}
-	for (int k = 0; k < 2; k++)
-		POINTS_SPREAD(runs->lambda[k], runs->p.lambda[k], runs->run, first, end);
+	for (int k = 0; k < 2; k++) {
+		to[n] = runs->lambda[k];
+		from[n++] = runs->p.lambda[k];
+	}
+	POINTS_SPREAD(to, from, runs->run, first, end);
 }
 
 static void points_resolve(struct strip *strip, const struct strip_view *view, const struct warp_instance *in,

@@ -80,17 +80,22 @@ static void find_leaves(struct strip_pixels *p, const struct warp_instance *in, 
 	}
 }
 
-static void find_points(struct strip_pixels *p, const struct warp_instance *in, uint32_t first, uint32_t end)
+static void find_points(struct strip_pixels *p, const struct warp_instance *in, uint32_t first, uint32_t end,
+                        int has_sides)
 {
 	const struct psr_points *points = in->points->model;
+	const struct dpoint_group *group = points->set->group;
+	const struct dpoint_word *word = points->set->word;
+	const uint32_t first_slot = in->first_slot;
 
 	for (uint32_t i = first; i < end; i++) {
-		const uint32_t group = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot;
+		const uint32_t id = p->id[i];
 
-		p->at[i] = &points->set->word[points->set->group[group].first + p->id[i] % PSR_BLOCK_SAMPLES].attr;
-		p->two_sided[i] = points->groups.flags[group] & PSR_BLOCK_TWO_SIDED;
+		p->at[i] = &word[group[id / PSR_BLOCK_SAMPLES - first_slot].first + id % PSR_BLOCK_SAMPLES].attr;
 		__builtin_prefetch(p->at[i]);
 	}
+	for (uint32_t i = first; i < end && has_sides; i++)
+		p->two_sided[i] = points->groups.flags[p->id[i] / PSR_BLOCK_SAMPLES - first_slot] & PSR_BLOCK_TWO_SIDED;
 }
 
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
@@ -98,6 +103,7 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 	const uint32_t n = p->n;
 
 	p->has_leaves = 0;
+	p->only_points = 1;
 	for (uint32_t i = 0, end; i < n;) {
 		const struct warp_instance *in = instance_run(&end, p, view, i, n);
 		const struct psr_blocks b = *in->blocks;
@@ -106,10 +112,12 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 			if (in->cubes)
 				find_leaves(p, in, i, end);
 			else
-				find_points(p, in, i, end);
+				find_points(p, in, i, end, view->needs & STRIP_TWO_SIDED);
+			p->only_points &= in->points != NULL;
 			i = end;
 			continue;
 		}
+		p->only_points = 0;
 		for (; i < end; i++) {
 			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
 			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);

@@ -31,7 +31,7 @@ static inline void repeat_last(struct strip_pixels *p)
 
 /* *all and *common: all attributes or-ed, and and-ed. */
 static CONSTANT_FLAGS void read_all(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view,
-                                    int has_leaves)
+                                    int has_leaves, int has_normals)
 {
 	const struct strip_pixels *p = strip->pixels;
 	const uint32_t n = strip_whole(p->n);
@@ -41,7 +41,8 @@ static CONSTANT_FLAGS void read_all(uint64_t *all, uint64_t *common, struct stri
 		const uint64_t attr = has_leaves && p->at[i] == NULL ? psr_cubes_attr(p->tree[i], p->leaf[i]) : *p->at[i];
 
 		strip->attr[i] = attr;
-		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
+		if (has_normals)
+			strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
 		some |= attr;
 		each &= attr;
 	}
@@ -52,9 +53,11 @@ static CONSTANT_FLAGS void read_all(uint64_t *all, uint64_t *common, struct stri
 static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
 {
 	if (strip->pixels->has_leaves)
-		read_all(all, common, strip, view, 1);
+		read_all(all, common, strip, view, 1, 1);
+	else if (!strip->pixels->only_points)
+		read_all(all, common, strip, view, 0, 1);
 	else
-		read_all(all, common, strip, view, 0);
+		read_all(all, common, strip, view, 0, 0);
 	strip->n = strip_whole(strip->pixels->n);
 	strip->is_specular = PSR_ATTR_GLOSS(*all) || view->needs & STRIP_SPECULAR;
 }
