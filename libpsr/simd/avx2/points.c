@@ -1,6 +1,7 @@
 /* Differential points: squares of 4x4 pixels, and columns of rows of 8. */
 #include <immintrin.h>
 #include "simd/kernels.h"
+#define SPANS_LANES 8
 #include "simd/loops/points.h"
 
 #define INLINE static inline __attribute__((always_inline))

@@ -63,18 +63,39 @@ static inline void store_eight(uint8_t *to, __m256i pixels)
 	_mm_storel_epi64((__m128i *)(to + 16), _mm256_extracti128_si256(bytes, 1));
 }
 
+/* 32 pixels of the background. */
+struct background {
+	uint8_t rgb[4 * 24 + 8];
+};
+
+static inline struct background background_of(__m256i empty)
+{
+	struct background b;
+
+	for (int i = 0; i < 4; i++)
+		store_eight(b.rgb + (size_t)24 * i, empty);
+	return b;
+}
+
 /* Scalar look-ups are faster than gathers. */
 static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
 	const struct strip_pixels *p = strip->pixels;
 	const uint16_t *dark = target->background;
 	const __m256i empty = _mm256_set1_epi32((int)pixel_of(target->srgb, dark[0], dark[1], dark[2]));
+	const struct background none = background_of(empty);
 	uint32_t pixel[STRIP + 8], n_written = 0;
 
 	for (uint32_t i = 0; i < p->n; i++)
 		pixel[i] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
 	for (uint32_t x = 0; x < n; x += 8) {
 		const uint32_t k = p->has_sample[x / 32] >> x % 32 & 0xff;
+
+		if (x % 32 == 0 && p->has_sample[x / 32] == 0 && n - x >= 32) {
+			memcpy(to + 3 * x, none.rgb, 96);
+			x += 24;
+			continue;
+		}
 		const __m256i samples = _mm256_loadu_si256((const __m256i *)(pixel + n_written));
 		const __m256i apart = _mm256_permutevar8x32_epi32(samples, back_of(k));
 		const __m256i pixels = _mm256_blendv_epi8(empty, apart, lanes_of(k));

@@ -6,6 +6,9 @@
 
 #define SPANS_ROWS 4   /* of a strip, which is drawn in pieces as wide as high */
 #define SPANS_LEAST 10 /* pieces of a point's bounds: of fewer, spans cost what they save */
+#ifndef SPANS_LANES
+#define SPANS_LANES POINTS_VECTOR /* strips are told in multiples of so many: most points have at most eight */
+#endif
 #define SPANS_ROOM (TILE_HEIGHT / SPANS_ROWS + POINTS_VECTOR)
 
 /* Pixels x0[s] .. x1[s] - 1 of strip s, from the top of a point's bounds on. */
@@ -91,7 +94,7 @@ static inline int find_spans(struct points_spans *spans, const struct points_bat
 	static const uint8_t edge[12][2] = { { 0, 1 }, { 2, 3 }, { 4, 5 }, { 6, 7 }, { 0, 2 }, { 1, 3 },
 		                                 { 4, 6 }, { 5, 7 }, { 0, 4 }, { 1, 5 }, { 2, 6 }, { 3, 7 } };
 	const int32_t x0 = b->x0[i], x1 = b->x1[i];
-	const uint32_t n = points_lanes(points_strips(b->y1[i] - b->y0[i]));
+	const uint32_t n = (points_strips(b->y1[i] - b->y0[i]) + SPANS_LANES - 1) / SPANS_LANES * SPANS_LANES;
 	float x[8], y[8], least[SPANS_ROOM], most[SPANS_ROOM];
 
 	if (!place_corners(x, y, b, i, t))
