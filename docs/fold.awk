@@ -20,17 +20,21 @@ function print_sentences(   i) {
 	n_sentences = is_long = 0
 }
 
+# A word that is longer than a line stays whole.
 function print_wrapped(line,   cut, text) {
 	while (length(line) > most) {
 		cut = most + 1
 		while (cut > 1 && substr(line, cut, 1) != " ")
 			cut--
+		if (cut == 1)
+			cut = index(line " ", " ")
 		text = substr(line, 1, cut - 1)
 		sub(/ +$/, "", text)
 		print text
 		line = substr(line, cut + 1)
 	}
-	print line
+	if (line != "")
+		print line
 }
 
 # kind[p]: 2 if some row has a "|" at p, 1 if all have blanks, 0 if some row has anything else.

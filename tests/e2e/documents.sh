@@ -84,3 +84,6 @@ awk -f docs/fold.awk "$work/table" >"$work/folded"
 none "a table that is folded fits a page" long_lines "$work/folded"
 none "and has all of its columns" lost_words "$work/table"
 check "with the first column in each part" test "$(grep -c '^another ' "$work/folded")" -gt 1
+
+printf 'a sentence of words and %0120d, which is none of them\n' 7 >"$work/long"
+none "a word that is longer than a line stays whole" lost_words "$work/long"
