@@ -31,6 +31,12 @@ static int is_coordinate(float v)
 	return v >= -MODEL_MAX_COORDINATE && v <= MODEL_MAX_COORDINATE;
 }
 
+/* The protocol tells lengths of at most 1e30, and positive ones from 1e-30 on. */
+static int is_told(double v)
+{
+	return v >= -1e30 && v <= 1e30;
+}
+
 static int is_unit(const float v[3])
 {
 	return fabsf(v3f_dot(v, v) - 1) <= UNIT_TOLERANCE;
@@ -46,13 +52,16 @@ static int check_info(const struct checker *c)
 			return fail(c, "INFO", "the origin is not finite");
 		if (!isfinite(info->box_min[k]) || !isfinite(info->box_max[k]) || info->box_min[k] > info->box_max[k])
 			return fail(c, "INFO", "the box is not finite or inside out");
+		if (!is_told(info->box_min[k]) || !is_told(info->box_max[k]))
+			return fail(c, "INFO", "the box is from %g to %g; coordinates are at most 1e30 in magnitude",
+			            info->box_min[k], info->box_max[k]);
 	}
 	if (!(fabs(v3d_dot(info->up, info->up) - 1) <= 1e-6))
 		return fail(c, "INFO", "up is %g,%g,%g; it must have length 1", info->up[0], info->up[1], info->up[2]);
 	if (!(info->scale > 0 && isfinite(info->scale)))
 		return fail(c, "INFO", "the scale is %g; it must be positive and finite", info->scale);
-	if (!(info->spacing > 0 && isfinite(info->spacing)))
-		return fail(c, "INFO", "the spacing is %g; it must be positive and finite", info->spacing);
+	if (!(info->spacing >= 1e-30 && is_told(info->spacing)))
+		return fail(c, "INFO", "the spacing is %g; it must be from 1e-30 to 1e30", info->spacing);
 	if (!(info->tolerance >= 0 && info->tolerance <= 1.5707963267948966))
 		return fail(c, "INFO", "the tolerance is %g; it must be an angle from 0 to half of pi", info->tolerance);
 	if (info->resolution == 0)

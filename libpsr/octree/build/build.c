@@ -7,6 +7,9 @@
 #include "base/direction.h"
 
 #define BATCH 4096
+/* The protocol has no lengths beyond 1e30, and none of leaves, 2^-20 of the cube's, below 1e-30. */
+#define LEAST_EDGE 1e-24
+#define MOST_LENGTH 1e30
 
 struct building {
 	const struct octree_source *source;
@@ -87,6 +90,9 @@ int octree_build_levels(int *levels, const struct octree_build_options *options,
 {
 	int rc = check_options(options, err);
 
+	if (rc == PSR_OK && (edge < LEAST_EDGE || edge > MOST_LENGTH))
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: it extends over %g: models are from %g to %g wide; scale it", name, edge,
+		                LEAST_EDGE, MOST_LENGTH);
 	*levels = options->levels > 0 ? options->levels : OCTREE_LEAST_LEVELS;
 	for (; rc == PSR_OK && options->levels == 0 && ldexp(edge, -*levels) > options->spacing; ++*levels)
 		if (*levels == OCTREE_MOST_LEVELS)
@@ -120,6 +126,9 @@ static int find_cube(struct building *b)
 	if (!isfinite(b->edge) || b->edge < ldexp(largest, -50))
 		return psr_fail(b->err, PSR_ERR_FORMAT, "%s: points that extend over %g at coordinates of %g cannot be told apart",
 		                b->source->name, b->edge, largest);
+	if (largest > MOST_LENGTH)
+		return psr_fail(b->err, PSR_ERR_FORMAT, "%s: points at coordinates of %g: a model's are at most %g; scale them",
+		                b->source->name, largest, MOST_LENGTH);
 	return octree_build_levels(&b->levels, b->options, b->source->name, b->edge, b->err);
 }
 

@@ -349,6 +349,16 @@ static void very_far(struct octree_point *point, uint64_t i)
 	*point = (struct octree_point){ .at = { i == 0 ? -1.7e308 : 1.7e308 } };
 }
 
+static void far(struct octree_point *point, uint64_t i)
+{
+	*point = (struct octree_point){ .at = { (double)i * 1e300 } };
+}
+
+static void tiny(struct octree_point *point, uint64_t i)
+{
+	*point = (struct octree_point){ .at = { (double)i * 1e-300 } };
+}
+
 static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
 {
 	static const struct {
@@ -360,6 +370,8 @@ static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
 		{ { .n = 10000, .make = at_one_place }, 5, PSR_ERR_FORMAT, "all 10000 points are at 1 2 3" },
 		{ { .n = 20, .make = no_number }, 5, PSR_ERR_FORMAT, "point 9 (counted from 0) has no finite y" },
 		{ { .n = 2, .make = very_far }, 5, PSR_ERR_FORMAT, "cannot be told apart" },
+		{ { .n = 2, .make = far }, 5, PSR_ERR_FORMAT, "points at coordinates of 1e+300: a model's are at most 1e+30" },
+		{ { .n = 2, .make = tiny }, 5, PSR_ERR_FORMAT, "it extends over 1e-300: models are from 1e-24 to 1e+30 wide" },
 		{ { .n = 9, .make = on_sphere }, 1, PSR_ERR_ARG, "1 levels" },
 		{ { .n = 9, .make = on_sphere }, 21, PSR_ERR_ARG, "21 levels" },
 	};
