@@ -31,7 +31,7 @@ struct fetching {
 	struct arrival *arrival;
 	const struct arrival_facts *facts;
 	uint64_t start_bytes, start_ns, drawn_ns;
-	int is_drawn, has_restarted;
+	int is_drawn, has_restarted, is_copy; /* the latter: the part began as a copy of the output */
 	uint32_t handle;              /* of a model that was built; 0: it is a file */
 	uint64_t stop;                /* byte that --level ends at; 0: not known, or the whole file */
 };
@@ -162,6 +162,8 @@ static int open_part(struct fetching *f, struct psr_error *err)
 		code = psr_fail(err, PSR_ERR_BUSY, "%s: another psr fetch writes it", f->part);
 	else
 		code = take_old(f, old >= 0 ? old : f->fd, err);
+	f->start_bytes = f->facts->n_taken;
+	f->is_copy = old >= 0;
 	if (old >= 0)
 		close(old);
 	return code;
@@ -288,7 +290,6 @@ static int fetch(struct fetching *f, struct psr_error *err)
 	if (code != PSR_OK)
 		return code;
 	f->start_ns = clock_ns();
-	f->start_bytes = f->facts->n_taken;
 	while (code == PSR_OK && !is_done)
 		code = ask(f, client, &is_done, err);
 	end_progress(f);
@@ -304,7 +305,7 @@ static void leave_part(struct fetching *f)
 	arrival_rewind(f->arrival);
 	if (f->fd < 0 || cut_part(f, f->facts->n_taken, &ignored) != PSR_OK)
 		return;
-	if (f->facts->n_taken == 0)
+	if (f->facts->n_taken == 0 || (f->is_copy && f->facts->n_taken == f->start_bytes))
 		unlink(f->part);
 	else if (!f->wish->quiet)
 		fprintf(stderr, "psr fetch: %s has %.2f of %.2f MB; the same command goes on from there\n", f->part,

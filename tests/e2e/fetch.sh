@@ -50,7 +50,10 @@ check "and the rest goes on behind them" bash -c 'psr fetch --server "$1" ball -
 check "without those that are there" grep -qvF "$(stat -c %s ball.psr | awk '{ printf "%.2f MB fetched", $1 / 1e6 }')" said
 check "and makes the whole file" cmp few.psr ball.psr
 refuses "levels of a file that has none" 2 "has no levels to end at" fetch teapot --level 3 -o none.psr
-rm -f said none.psr.part
+check "such a file whole" fetch teapot -o whole.psr
+refuses "its levels, when it is there" 2 "has no levels to end at" fetch teapot --level 3 -o whole.psr
+check "nothing is left beside what is there whole" [ ! -e whole.psr.part ]
+rm -f said none.psr.part whole.psr
 
 # What psrd draws of these levels is what the part of the file is.
 shot() { psr shot --server "$server" --size 96x96 "$@"; }
