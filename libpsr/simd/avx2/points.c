@@ -1,4 +1,4 @@
-/* Differential points: squares of 4x4 pixels, and columns of rows of 8. */
+/* Differential points: squares of 4x4 pixels, and pairs of rows of 8: two vectors at a time. */
 #include <immintrin.h>
 #include "simd/kernels.h"
 #define SPANS_LANES 8
@@ -134,7 +134,8 @@ INLINE void in_order(__m256 *value, __m256 *other)
 INLINE void meet(__m256i bits[2], const struct rays *p, const struct parts dx[2], const struct parts dy[2],
                  const __m256i outside[2], int perspective)
 {
-	const struct equations e = equations_of(p, dx[0], dy[0], perspective), f = equations_of(p, dx[1], dy[1], perspective);
+	const struct equations e = equations_of(p, dx[0], dy[0], perspective);
+	const struct equations f = equations_of(p, dx[1], dy[1], perspective);
 	__m256 r0 = e.inside, r1 = f.inside;
 
 	in_order(&r0, &r1);
@@ -215,8 +216,8 @@ INLINE struct four_rows four_rows_of(const struct drawing *d, int32_t y)
 		                         _mm256_cmpgt_epi32(row, all_int(d->y1 - y - 3)) } };
 }
 
-INLINE void draw_square(const struct drawing *d, const struct four_rows *rows, struct parts across, int32_t x, int32_t y,
-                        int perspective)
+INLINE void draw_square(const struct drawing *d, const struct four_rows *rows, struct parts across, int32_t x,
+                        int32_t y, int perspective)
 {
 	const __m256i beside = _mm256_cmpgt_epi32(column_of_lane(4), all_int(d->x1 - x - 1));
 	const __m256i outside[2] = { _mm256_or_si256(beside, rows->below[0]), _mm256_or_si256(beside, rows->below[1]) };
@@ -260,11 +261,10 @@ INLINE void draw_rows(const struct drawing *d, int32_t x0, int32_t y0, int persp
 }
 
 INLINE void draw_squares(const struct drawing *d, int32_t x0, int32_t y0, const struct points_spans *spans,
-                            int perspective)
+                         int perspective)
 {
 	for (int32_t y = y0, s = 0; y < d->y1; y += SPANS_ROWS, s++) {
 		const struct four_rows rows = four_rows_of(d, y);
-
 		const int32_t begin = spans != NULL ? x0 + (spans->x0[s] - x0) / 4 * 4 : x0;
 		const int32_t end = spans != NULL ? spans->x1[s] : d->x1;
 
@@ -277,9 +277,7 @@ INLINE void draw_by(const struct warp_target *t, const struct points_batch *b, u
                     const struct points_spans *spans, int perspective)
 {
 	const struct drawing d = drawing_of(t, b, i);
-	const int32_t x0 = b->x0[i], y0 = b->y0[i];
-
-	const int32_t width = d.x1 - x0, height = d.y1 - y0;
+	const int32_t x0 = b->x0[i], y0 = b->y0[i], width = d.x1 - x0, height = d.y1 - y0;
 
 	if (spans == NULL && width <= 4)
 		draw_narrow(&d, x0, y0, perspective);

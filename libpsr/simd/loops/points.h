@@ -25,9 +25,9 @@ struct points_shape {
 	int32_t columns, lanes;
 };
 
-/* Meets lines of sight with the quadric, a u^2 + c v^2 = 2 w: at place s along one, square s^2 - 2 linear s = rest. Where
- * the quadric's normal faces the eye, the derivative along the line is below 0, which tells one root of two. No number
- * is nowhere. x: of the centre of column 0, from the point. */
+/* Meets lines of sight with the quadric, a u^2 + c v^2 = 2 w: at place s along one, square s^2 - 2 linear s = rest.
+ * Where the quadric's normal faces the eye, the derivative along the line is below 0, which tells one root of two. Where
+ * there is none, s is no number, and nothing is hit. x: of the centre of column 0, from the point. */
 static inline __attribute__((always_inline)) void meet_quadric(uint32_t *bits, const struct warp_target *t,
                                                                const struct points_batch *b, uint32_t of, float x,
                                                                int32_t first, int32_t y, struct points_shape shape)
