@@ -5,7 +5,8 @@
 #include "rectangle.h"
 
 /* Quadrics over neighbouring places end at slightly different heights, so a slanted ray may pass over one and under
- * the other. Each cell is looked at along 17 rays to each of 9 places; one of two sides from both, along 25. Where one
+ * the other. Each cell is looked at along 17 rays to each of 9 places; one of two sides from both, along 33;
+ * one of a saddle, where curvatures are exact, along four flat ones more. Where one
  * gets through, which nothing stops until six times options->height behind the place, candidates that were left out are
  * kept, those first that are over most such cells; where it still does, a flat point in the cell's own plane. Planes of
  * neighbouring cells meet at their sides, so these leave no gap. Clouds are left as they are: their cells do not meet.

@@ -19,10 +19,12 @@ int study_dpoint_prune(struct dpoint_choice *choice, const struct dpoint_surface
 #define STUDY_DPOINT_DELTA 0.0127f
 #define STUDY_DPOINT_DELTA_FREE 0.125f /* of a class: groups have no other */
 
+#define STUDY_DPOINT_RESOLUTION 512 /* of models */
+
 /* Slack is half a step of a group's box of 0.6. */
 #define STUDY_DPOINT_FITTED(degrees, most_height) { \
 	.sine = dpoint_sine(STUDY_DPOINT_EPSILON), .slack = 2e-5f, .angle = (float)((degrees) * PSR_DEGREE), \
-	.height = (most_height), .overhang = 5e-4f, \
+	.height = (most_height), .overhang = 5e-4f, .graze = 0.5f * dpoint_graze(STUDY_DPOINT_RESOLUTION), \
 }
 
 /* ---- teapot.c ---- */
@@ -63,7 +65,6 @@ void study_dpoint_dull(struct psr_material *material);
 
 /* Makes a model of what was chosen, in units of the mesh, with the look of its first material, dull unless it is
  * specular. It paints the candidates. */
-#define STUDY_DPOINT_RESOLUTION 512
 int study_dpoint_model(struct psr_model **out, struct study *study, const struct study_model *of,
                        struct dpoint_surface *surface, const struct dpoint_choice *choice, int is_specular);
 

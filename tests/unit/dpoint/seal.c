@@ -7,7 +7,9 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "dpoint/mesh.h"
+#include "dpoint/sample.h"
 #include "dpoint/seal.h"
+#include "patches.h"
 
 #define SIDE 8 /* squares of the mesh */
 
@@ -210,10 +212,74 @@ static void none_along_either_of_two_sides_does(void **state)
 	check_sealed((const uint8_t[]){ 1 });
 }
 
+/* Rays to the middles of a torus's cells along the two lines in which its inner half does not bend, 86 degrees off. */
+static size_t count_along(const struct dpoint_surface *surface, const struct dpoint_choice *choice,
+                          const struct dpoint_cover_options *o, double out, double r)
+{
+	size_t n = 0;
+
+	for (size_t i = 0; i < surface->n_cells; i++) {
+		float m[3];
+		double at[3], round, cosine;
+
+		dpoint_cell_middle(m, &surface->cell[i]);
+		for (int k = 0; k < 3; k++)
+			at[k] = m[k];
+		round = hypot(at[0], at[1]);
+		cosine = (round - out) / r;
+		if (cosine > -0.2)
+			continue;
+		for (int d = 0; d < 4; d++) {
+			const double normal[3] = { cosine * at[0] / round, cosine * at[1] / round, at[2] / r };
+			const double around[3] = { -at[1] / round, at[0] / round, 0 };
+			const double ratio = sqrt(-cosine * r / (out + r * cosine)); /* along the tube, for 1 around the axis */
+			double tube[3], w[3];
+
+			v3d_cross(tube, normal, around);
+			for (int k = 0; k < 3; k++)
+				w[k] = (d & 1 ? 1 : -1) * around[k] + (d & 2 ? ratio : -ratio) * tube[k];
+			v3d_normalize(w, w);
+			for (int k = 0; k < 3; k++)
+				w[k] = 0.07 * normal[k] + sqrt(1 - 0.07 * 0.07) * w[k];
+			n += (size_t)gets_through(surface, choice, o, at, w, 15.001 * (double)o->height);
+		}
+	}
+	return n;
+}
+
+static void none_along_a_saddle_does(void **state)
+{
+	const double out = 0.6, r = 0.3;
+	const struct dpoint_cover_options options = {
+		.sine = dpoint_sine(0.02), .slack = 2e-5f, .angle = 0.1f, .height = 0.002f, .overhang = 5e-4f,
+	};
+	const struct dpoint_uniform uniform = { .n = 16, .cells = 2, .scale = 1, .delta = 0.125f, .sine = options.sine };
+	struct revolved torus;
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+
+	(void)state;
+	revolve(&torus, out, r, 0, 9);
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_uniform(&surface, &torus.patch, &uniform), PSR_OK);
+	assert_int_equal(dpoint_fit(&surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
+	assert_true(count_along(&surface, &choice, &options, out, r) > 0);
+	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
+	assert_int_equal(count_along(&surface, &choice, &options, out, r), 0);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(no_ray_that_is_looked_at_gets_through),
+		cmocka_unit_test(none_along_a_saddle_does),
 		cmocka_unit_test(none_along_either_of_two_sides_does),
 	};
 
