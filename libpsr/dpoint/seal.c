@@ -197,45 +197,43 @@ static int stops_rays(const struct sealing *s, struct nearby *nearby, const stru
 	return 1;
 }
 
-/* A saddle's surface goes on straight along two lines: who looks along one sees it graze for long, and an outline may end
- * there, with the surface behind it. So such rays to cells of one side are looked at as well. Directions are those of the
- * lid that is over the cell's middle. Returns 0 where there is none, or it is no saddle. Curvatures of meshes are too rough
- * for that. */
-static int directions_along(float (*from)[3], const struct sealing *s, const struct nearby *nearby, const float middle[3],
-                            const float normal[3])
+/* The lines in which a lid's saddle does not bend, as rays that graze a cell. */
+static void directions_along(float (*from)[3], const struct rectangle *r, const float normal[3])
+{
+	const float u = sqrtf(-r->rho);
+
+	for (int d = 0; d < ALONG_SADDLE; d++) {
+		const float away[3] = { d & 1 ? u : -u, d & 2 ? 1 : -1, 0 };
+		float along[3];
+
+		m3f_apply_transposed(along, (const float (*)[3])r->axis, away);
+		v3f_add_scaled(along, along, -v3f_dot(along, normal), normal);
+		v3f_normalize(along, along);
+		v3f_scale(from[d], normal, GRAZING);
+		v3f_add_scaled(from[d], from[d], sqrtf(1 - GRAZING * GRAZING), along);
+	}
+}
+
+/* A saddle over a place, and as high as the surface there; NULL: none. */
+static const struct rectangle *find_saddle(const struct sealing *s, const struct nearby *nearby, const float at[3])
 {
 	for (size_t i = 0; i < nearby->n; i++) {
 		const struct rectangle *r = &nearby->near[i].lid->rectangle;
 		float p[3];
 
-		rectangle_sees(p, r, middle);
-		if (r->rho > -LEAST_SADDLE || fabsf(p[0]) > r->extent[0] || fabsf(p[1]) > r->extent[1] ||
-		    fabsf(p[2] - dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1])) > s->options->height)
+		if (r->rho > -LEAST_SADDLE)
 			continue;
-		for (int d = 0; d < ALONG_SADDLE; d++) {
-			const float u = sqrtf(-r->rho), away[3] = { d & 1 ? u : -u, d & 2 ? 1 : -1, 0 };
-			float along[3];
-
-			m3f_apply_transposed(along, (const float (*)[3])r->axis, away);
-			v3f_add_scaled(along, along, -v3f_dot(along, normal), normal);
-			v3f_normalize(along, along);
-			v3f_scale(from[d], normal, GRAZING);
-			v3f_add_scaled(from[d], from[d], sqrtf(1 - GRAZING * GRAZING), along);
-		}
-		return 1;
+		rectangle_sees(p, r, at);
+		if (fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1] &&
+		    fabsf(p[2] - dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1])) <= s->options->height)
+			return r;
 	}
-	return 0;
+	return NULL;
 }
 
-static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
-                           const float middle[3], const float normal[3], float radius)
+static int stops_along(const struct sealing *s, const struct nearby *nearby, const struct dpoint_cell *cell,
+                       const float (*from)[3], const float middle[3])
 {
-	float from[ALONG_SADDLE][3];
-
-	nearby->n = 0;
-	gather(nearby, s, 0, middle, radius + 2 * GRAZED * s->behind);
-	if (!directions_along(from, s, nearby, middle, normal))
-		return 1;
 	for (int p = 0; p < PLACES; p++) {
 		int n_open = ALONG_SADDLE;
 		uint8_t is_stopped[ALONG_SADDLE] = { 0 };
@@ -244,13 +242,35 @@ static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const
 		place_of(place, cell, middle, p);
 		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
 			rectangle_sees(seen, &nearby->near[i].lid->rectangle, place);
-			n_open = stop_rays(is_stopped, n_open, ALONG_SADDLE, nearby->near[i].lid, seen, (const float (*)[3])from,
-			                   GRAZED * s->behind);
+			n_open = stop_rays(is_stopped, n_open, ALONG_SADDLE, nearby->near[i].lid, seen, from, GRAZED * s->behind);
 		}
 		if (n_open > 0)
 			return 0;
 	}
 	return 1;
+}
+
+/* A saddle's surface goes on straight along two lines: who looks along one sees it graze for long, and an outline may end
+ * there, with the surface behind it. So such rays to cells of one side are looked at as well. Curvatures of meshes are too
+ * rough for that. */
+static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
+                           const float middle[3], const float normal[3], float radius)
+{
+	float from[ALONG_SADDLE][3];
+
+	if (s->surface->facets.n > 0 || dpoint_is_two_sided(s->options, cell->part))
+		return 1;
+	nearby->n = 0;
+	gather(nearby, s, 0, middle, radius);
+	const struct rectangle *saddle = find_saddle(s, nearby, middle);
+	if (saddle == NULL)
+		return 1;
+	directions_along(from, saddle, normal);
+	if (stops_along(s, nearby, cell, (const float (*)[3])from, middle))
+		return 1;
+	nearby->n = 0;
+	gather(nearby, s, 0, middle, radius + 2 * GRAZED * s->behind);
+	return stops_along(s, nearby, cell, (const float (*)[3])from, middle);
 }
 
 /* Those that are over the cell stop most: others are asked only where these do not. */
@@ -268,8 +288,7 @@ static int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at
 		v3f_sub(away, cell->corner[c], middle);
 		radius = fmaxf(radius, v3f_length(away));
 	}
-	if (s->surface->facets.n == 0 && !dpoint_is_two_sided(s->options, cell->part) &&
-	    !is_sealed_along(s, nearby, cell, middle, from[0][0], radius))
+	if (!is_sealed_along(s, nearby, cell, middle, from[0][0], radius))
 		return 0;
 	if (s->over != NULL && s->over[at] != UINT32_MAX && stops_all(s, &s->lid[s->over[at]], cell, middle, from[0][0]))
 		return 1;
