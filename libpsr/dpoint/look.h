@@ -9,6 +9,8 @@
 /* Channels as 255ths: unlit, red, green, blue (sRGB-coded), metallic, reflectance, shut, roughness. */
 #define LOOK_CHANNELS 8
 
+#define LOOK_NORMAL 0x7fff /* bits of attributes that are no look */
+
 static const struct look_channel {
 	uint8_t at, most, step; /* its lowest bit, its greatest code, 255ths a code */
 } look_channel[LOOK_CHANNELS] = {

@@ -7,6 +7,8 @@
 #include "choice.h"
 #include "rectangle.h"
 
+#define AROUND 3 /* levels of the tree: a cell is looked at with seven around it */
+
 /* Along a side of a cell, and across it: half of what the cell takes of both, from its middle on. next: the side comes
  * so many after the longest. is_own: with the normal of the cell's plane, and not that of the surface. */
 static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell, int next,
@@ -85,6 +87,25 @@ struct mending {
 	struct bound_view view;
 };
 
+/* Points that mend cover their cells whatever these look like. */
+static struct dpoint_cover_options any_of(const struct dpoint_cover_options *options)
+{
+	return (struct dpoint_cover_options){ .sine = options->sine, .slack = options->slack, .angle = 1, .height = 1,
+		                                  .is_within_parts = options->is_within_parts, .looks = 255 };
+}
+
+static int is_covered(const struct mending *m, const struct dpoint_candidate *c, uint32_t at)
+{
+	const struct dpoint_cover_options any = any_of(m->options);
+	struct rectangle r;
+	struct looking look;
+
+	looking_init(&look, m->surface, m->tally->cover->tree, &any);
+	rectangle_of(&r, c, &any);
+	rectangle_shorten(&r, any.slack);
+	return rectangle_covers(&look, &r, &m->surface->cell[at]);
+}
+
 static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint32_t at, enum kind kind)
 {
 	if (kind != BENT)
@@ -92,7 +113,7 @@ static int patch_of(struct dpoint_candidate *out, const struct mending *m, uint3
 	if (m->own[at] == UINT32_MAX)
 		return 0;
 	*out = m->surface->candidate[m->own[at]];
-	return rectangle_around(out->delta, out, &m->surface->cell[at], m->options);
+	return rectangle_around(out->delta, out, &m->surface->cell[at], m->options) && is_covered(m, out, at);
 }
 
 static double error_of(struct bound_view *view, const struct dpoint_surface *surface, const struct dpoint_candidate *c,
@@ -106,13 +127,13 @@ static double error_of(struct bound_view *view, const struct dpoint_surface *sur
 
 /* Finds the first kind of patch that is within the error, or the nearest. Returns 0 where none is near the surface at
  * all; *is_bad: there is none of any kind. */
-static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mending *m, uint32_t at)
+static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mending *m, uint32_t at, enum kind first)
 {
 	struct dpoint_candidate patch;
 	double least = INFINITY;
 
 	*is_bad = 1;
-	for (enum kind kind = m->first; kind < m->n_kinds && least > m->error && !m->view.is_failed; kind++) {
+	for (enum kind kind = first; kind < m->n_kinds && least > m->error && !m->view.is_failed; kind++) {
 		double error;
 
 		if (!patch_of(&patch, m, at, kind))
@@ -127,13 +148,34 @@ static int bounded_patch(struct dpoint_candidate *out, int *is_bad, struct mendi
 	return least < INFINITY;
 }
 
-static int put_patch(struct mending *m, uint32_t at)
+/* Whether a cell was left open since its neighbours look different: then its shape is as good as theirs. Strips have no
+ * look. */
+static int is_left_by_look(const struct mending *m, size_t node)
+{
+	const struct cell_tree *tree = m->tally->cover->tree;
+	const uint32_t at = tree->order[tree->node[node].begin];
+	struct look_range all, look;
+
+	look_range_of(&all, m->surface->cell[at].attr);
+	for (int i = 0; i < AROUND && node > 0; i++)
+		node = (node - 1) / 2;
+	for (uint32_t c = tree->node[node].begin; c < tree->node[node].end; c++) {
+		const struct dpoint_cell *cell = &m->surface->cell[tree->order[c]];
+
+		look_range_of(&look, cell->attr);
+		if (cell->part != DPOINT_BEYOND)
+			look_range_join(&all, &look);
+	}
+	return look_range_width(&all) > m->options->looks;
+}
+
+static int put_patch(struct mending *m, uint32_t at, size_t node)
 {
 	struct dpoint_candidate patch, *candidate;
 	int is_there, is_bad;
 
 	if (m->error > 0) {
-		is_there = bounded_patch(&patch, &is_bad, m, at);
+		is_there = bounded_patch(&patch, &is_bad, m, at, is_left_by_look(m, node) ? BENT : m->first);
 	} else {
 		is_there = (m->own != NULL && patch_of(&patch, m, at, BENT)) || patch_of(&patch, m, at, FLAT);
 		is_bad = !is_there;
@@ -160,7 +202,7 @@ static int patch_below(struct mending *m, size_t i)
 		return PSR_OK;
 	if (cell_node_is_leaf(&tree->node[i])) {
 		cell = tree->order[tree->node[i].begin];
-		return m->surface->cell[cell].part != DPOINT_BEYOND ? put_patch(m, cell) : PSR_OK;
+		return m->surface->cell[cell].part != DPOINT_BEYOND ? put_patch(m, cell, i) : PSR_OK;
 	}
 	rc = patch_below(m, 2 * i + 1);
 	return rc == PSR_OK ? patch_below(m, 2 * i + 2) : rc;
@@ -179,12 +221,10 @@ static int find_own(struct mending *m)
 	return PSR_OK;
 }
 
-/* Points that mend cover their cells whatever these look like. */
 static int cover_any(struct dpoint_cover *cover, const struct dpoint_surface *surface,
                      const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
-	const struct dpoint_cover_options any = { .sine = options->sine, .slack = options->slack, .angle = 1, .height = 1,
-		                                      .is_within_parts = options->is_within_parts, .looks = 255 };
+	const struct dpoint_cover_options any = any_of(options);
 
 	return cover_candidates(cover, surface, &any, work);
 }

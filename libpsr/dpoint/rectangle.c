@@ -20,6 +20,16 @@ void looking_init(struct looking *l, const struct dpoint_surface *surface, const
 		l->chord = (float)sqrt(2 - 2 * c);
 }
 
+float cell_area(const struct dpoint_cell *cell)
+{
+	float a[3], b[3], n[3];
+
+	v3f_sub(a, cell->corner[2], cell->corner[0]);
+	v3f_sub(b, cell->corner[3], cell->corner[1]);
+	v3f_cross(n, a, b);
+	return 0.5f * v3f_length(n);
+}
+
 void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options)
 {
 	const float lambda[2] = { c->point.lambda_u, c->point.lambda_u * c->point.rho };

@@ -14,6 +14,8 @@ struct looking {
 void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
                   const struct dpoint_cover_options *options);
 
+float cell_area(const struct dpoint_cell *cell);
+
 struct rectangle {
 	float at[3], axis[3][3]; /* u, v, normal */
 	float slant[3][3];       /* of each of them, how far it goes along x, y and z */
@@ -84,6 +86,11 @@ int shrink_within(struct dpoint_candidate *c, const struct dpoint_candidate *bef
  * keep it, or are left out. MEMORY, CANCELLED. */
 int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, const uint8_t *is_open,
                 const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
+/* Gives each kept candidate the mean look of the cells that it covers: within options->looks of those that are so near to
+ * its own. */
+void paint(struct dpoint_surface *surface, const struct dpoint_choice *choice, const struct dpoint_cover *cover,
+           const struct dpoint_cover_options *options);
 
 /* Makes the lists of the surface's candidates that the cover lacks: its last ones. */
 int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *surface,

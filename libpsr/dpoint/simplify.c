@@ -70,16 +70,6 @@ static int turn(struct dpoint_surface *surface, struct dpoint_cover *cover, size
 	return rc == PSR_OK ? cover_candidates(cover, surface, options, work) : rc;
 }
 
-static float area_of(const struct dpoint_cell *cell)
-{
-	float a[3], b[3], n[3];
-
-	v3f_sub(a, cell->corner[2], cell->corner[0]);
-	v3f_sub(b, cell->corner[3], cell->corner[1]);
-	v3f_cross(n, a, b);
-	return 0.5f * v3f_length(n);
-}
-
 /* One of how many candidates like this one comes first: `sparse`, or more where its rectangle is many cells wide:
  * CHOICE are enough to choose from. */
 static uint32_t sparsity(const struct dpoint_surface *surface, const struct dpoint_candidate *candidate,
@@ -89,7 +79,7 @@ static uint32_t sparsity(const struct dpoint_surface *surface, const struct dpoi
 	float n;
 
 	rectangle_of(&r, candidate, options);
-	n = 4 * r.extent[0] * r.extent[1] / (CHOICE * area_of(&surface->cell[candidate->cell]));
+	n = 4 * r.extent[0] * r.extent[1] / (CHOICE * cell_area(&surface->cell[candidate->cell]));
 	return sparse > 1 && n > (float)sparse ? (uint32_t)fminf(n, MOST_SPARSE) : sparse;
 }
 
@@ -145,5 +135,9 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 		rc = dpoint_choose(choice, cover);
 	if (rc == PSR_OK && psr_is_cancelled(cancel))
 		rc = PSR_ERR_CANCELLED;
-	return rc == PSR_OK ? seal(surface, choice, cover, options, &work) : rc;
+	if (rc == PSR_OK)
+		rc = seal(surface, choice, cover, options, &work);
+	if (rc == PSR_OK)
+		paint(surface, choice, cover, options);
+	return rc;
 }

@@ -551,6 +551,95 @@ static void what_is_too_much_is_refused_before_it_is_cut(void **state)
 	free(m);
 }
 
+/* Every other triangle has so much red. */
+static int look_checked(void *userdata, uint32_t triangle, double u, double v, uint64_t *attr)
+{
+	const int red = *(const int *)userdata;
+
+	(void)u;
+	(void)v;
+	*attr = triangle % 2 ? (uint64_t)red << 16 : 0;
+	return 1;
+}
+
+/* Candidates of a torus cover nothing. Cells whose neighbours look like them get flat points, others bent ones. */
+static void what_mends_is_bent_where_looks_differ(void **state)
+{
+	static const struct dpoint_cover_options options = {
+		.sine = 0.2f, .slack = 1e-5f, .angle = 0.1f, .height = 0.004f, .overhang = OVERHANG, .looks = 8,
+	};
+	struct psr_material opaque = { .alpha = PSR_ALPHA_OPAQUE };
+	struct grid_mesh *m = malloc(sizeof *m);
+
+	(void)state;
+	assert_non_null(m);
+	round_mesh(m, 1, 48);
+	m->mesh.material = &opaque;
+	m->mesh.n_materials = 1;
+	for (int red = 0; red < 256; red += 255) {
+		const struct dpoint_mesh_options of_mesh = { .scale = 1, .cell = 0.25, .delta = 0.25f, .look = look_checked,
+			                                         .userdata = &red };
+		struct dpoint_surface surface;
+		struct dpoint_cover cover;
+		size_t n, n_bent = 0;
+
+		dpoint_surface_init(&surface);
+		assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &of_mesh, NULL), PSR_OK);
+		n = surface.n_candidates;
+		for (size_t i = 0; i < n; i++)
+			surface.candidate[i].delta[0] = surface.candidate[i].delta[1] = dpoint_delta_of_class(DPOINT_DELTA_CLASSES - 1);
+		assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
+		assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
+		assert_int_equal(surface.n_candidates, 2 * n);
+		for (size_t i = n; i < 2 * n; i++)
+			n_bent += surface.candidate[i].point.lambda_u != 0;
+		assert_true(red > 0 ? n_bent > n / 2 : n_bent == 0);
+		dpoint_cover_fini(&cover);
+		dpoint_surface_fini(&surface);
+	}
+	free(m);
+}
+
+/* Triangles of a torus have a red of 0 and of 6 by turns, and rectangles are wider: without a mean points would have one
+ * of these. */
+static void a_point_looks_as_the_mean_of_its_cells(void **state)
+{
+	static const struct dpoint_cover_options options = {
+		.sine = 0.2f, .slack = 1e-5f, .angle = 0.2f, .height = 0.01f, .overhang = OVERHANG, .looks = 8,
+	};
+	struct psr_material opaque = { .alpha = PSR_ALPHA_OPAQUE };
+	struct grid_mesh *m = malloc(sizeof *m);
+	int red = 6;
+	const struct dpoint_mesh_options of_mesh = { .scale = 1, .cell = 0.02, .delta = 0.25f, .look = look_checked,
+		                                         .userdata = &red };
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+	size_t n_between = 0;
+
+	(void)state;
+	assert_non_null(m);
+	round_mesh(m, 1, 48);
+	m->mesh.material = &opaque;
+	m->mesh.n_materials = 1;
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &of_mesh, NULL), PSR_OK);
+	assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &options, 4, NULL, NULL), PSR_OK);
+	for (size_t i = 0; i < surface.n_candidates; i++) {
+		const uint64_t attr = surface.candidate[i].point.attr;
+
+		if (!choice.is_kept[i])
+			continue;
+		assert_true(attr >> 15 <= (uint64_t)red << 1); /* no other channel has anything */
+		n_between += (attr >> 16) > 0 && (attr >> 16) < 6;
+	}
+	assert_true(n_between > choice.n_kept / 2);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+	free(m);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -566,6 +655,8 @@ int main(void)
 		cmocka_unit_test(pieces_are_cut_where_normals_turn),
 		cmocka_unit_test(too_many_pieces_are_refused),
 		cmocka_unit_test(what_is_too_much_is_refused_before_it_is_cut),
+		cmocka_unit_test(what_mends_is_bent_where_looks_differ),
+		cmocka_unit_test(a_point_looks_as_the_mean_of_its_cells),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
