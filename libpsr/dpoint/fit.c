@@ -74,12 +74,6 @@ static inline int is_beyond(const lanes corner[4], const struct search *s)
 	return lanes_any(nearest + (lanes){ s->over[0], s->over[1], 0, 0 } >= s->sides);
 }
 
-/* Whether it is the strip beside the border of another sheet, above S_p or below: strips of S_p's own sheet touch it. */
-static int is_strip_of_other(const struct dpoint_cell *cell, const float above[4], float height)
-{
-	return cell->part == DPOINT_BEYOND && fminf(fminf(above[0], above[1]), fminf(above[2], above[3])) > height;
-}
-
 /* The surface that goes on beside the rectangle leaves S_p gradually: a cell that S_p runs through, or that is within
  * some heights of it, is of that surface. One that looks back is of another. */
 static void look_at(struct search *s, const struct fitting *f, const struct rectangle *r,
@@ -102,8 +96,6 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 		return;
 	for (int c = 0; c < 4; c++)
 		above[c] = fabsf(corner[c][2] - dpoint_height_at(r->lambda_u, r->rho, corner[c][0], corner[c][1]));
-	if (is_strip_of_other(cell, above, r->height))
-		return;
 	bar = bar_of((const float (*)[3])corner, above, r->height);
 	for (int k = 0; k < 2; k++)
 		bar.at[k] += s->over[k];

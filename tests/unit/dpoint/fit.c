@@ -145,46 +145,11 @@ static void a_rectangle_narrower_than_the_overhang_ends_along_its_length(void **
 	dpoint_surface_fini(&surface);
 }
 
-/* What is beside the border of a sheet at z, from x = `from` to `to`: 1/64 wide, as cells are. */
-static void add_strip(struct dpoint_surface *surface, float z, float from, float to)
-{
-	for (int i = 0; i < 128; i++) {
-		struct dpoint_cell *cell = dpoint_surface_cell(surface);
-		const float y = (float)i / 64 - 1;
-
-		assert_non_null(cell);
-		*cell = (struct dpoint_cell){ { { from, y, z }, { from, y + 1.0f / 64, z }, { to, y + 1.0f / 64, z }, { to, y, z } },
-			                          { 0, 0, 1 }, .part = DPOINT_BEYOND };
-	}
-}
-
-/* A floor that ends at x = 0, and beneath it, four heights deep, a sheet that ends there, too, coming from the other
- * side: the strip beside that one reaches under the floor. Rectangles end at the floor's own border. */
-static void a_strip_beside_another_sheet_ends_no_rectangle(void **state)
-{
-	struct dpoint_surface surface;
-	size_t n_near = 0;
-
-	(void)state;
-	dpoint_surface_init(&surface);
-	add_plane(&surface, (const double[3]){ -1, -1, 0 }, (const double[3]){ 1, 0, 0 }, (const double[3]){ 0, 2, 0 });
-	add_strip(&surface, 0, 0, 1.0f / 64);
-	add_strip(&surface, -4 * options.height, 0, -1.0f / 64);
-	assert_int_equal(dpoint_fit(&surface, &options, NULL, NULL), PSR_OK);
-	for (size_t i = 0; i < surface.n_candidates; i++) {
-		n_near += reach(&surface.candidate[i], 0) > -1.0 / 128;
-		assert_true(reach(&surface.candidate[i], 0) <= (double)OVERHANG + 1e-6);
-	}
-	assert_true(n_near > 100);
-	dpoint_surface_fini(&surface);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sheets_that_cross_end_no_rectangle),
 		cmocka_unit_test(a_rectangle_ends_at_an_acute_edge),
-		cmocka_unit_test(a_strip_beside_another_sheet_ends_no_rectangle),
 		cmocka_unit_test(a_rectangle_narrower_than_the_overhang_ends_along_its_length),
 		cmocka_unit_test(samples_whose_rectangles_are_small_come_by_cells),
 	};
