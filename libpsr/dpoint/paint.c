@@ -1,6 +1,5 @@
 /* The look of a kept point: the mean of what it covers, not that of the cell in its middle alone. */
 #include <string.h>
-#include "base/vec.h"
 #include "choice.h"
 #include "rectangle.h"
 

@@ -5,11 +5,11 @@
 #include "rectangle.h"
 
 /* Quadrics over neighbouring places end at slightly different heights, so a slanted ray may pass over one and under
- * the other. Each cell is looked at along 17 rays to each of 9 places; one of two sides from both, along 33;
- * one of a saddle, where curvatures are exact, along four flat ones more. Where one
- * gets through, which nothing stops until six times options->height behind the place, candidates that were left out are
- * kept, those first that are over most such cells; where it still does, a flat point in the cell's own plane. Planes of
- * neighbouring cells meet at their sides, so these leave no gap. Clouds are left as they are: their cells do not meet.
+ * the other. Each cell is looked at along 17 rays to each of 9 places; one of two sides from both, along 33; one of a
+ * saddle, where curvatures are exact, along four flat ones more. Where one gets through, which nothing stops until six
+ * times options->height behind the place, candidates that were left out are kept, those first that are over most such
+ * cells; where it still does, a flat point in the cell's own plane. Planes of neighbouring cells meet at their sides,
+ * so these leave no gap. Clouds are left as they are: their cells do not meet.
  * Adds to surface, choice and cover. MEMORY, CANCELLED. */
 int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
          const struct dpoint_cover_options *options, const struct dpoint_work *work);

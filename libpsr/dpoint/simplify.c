@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/random.h"
-#include "base/vec.h"
 #include "choice.h"
 #include "seal.h"
 

@@ -1,0 +1,273 @@
+/* Rays to a cell, and lids in their way. */
+#include "sealed.h"
+
+#include <math.h>
+#include <string.h>
+#include "base/array.h"
+#include "base/vec.h"
+#include "group.h"
+
+#define PLACES 9  /* of a cell: corners, middles of sides, the middle */
+#define INWARDS 0.9f
+#define GRAZED 2.5f /* of `behind`, for grazing rays: they get as much further before they are as deep */
+
+#define STEEP (1 + 2 * AROUND) /* rays to any cell; more graze cells of two sides */
+#define DIRECTIONS (STEEP + AROUND_GRAZING)
+
+#define GRAZING 0.07f
+#define ALONG_SADDLE 4 /* rays along both lines in which a saddle does not bend, either way */
+#define LEAST_SADDLE 0.01f /* -rho */
+
+/* Cosines of rays to the cell's normal. More rays, 86 degrees off and from between those directions as well, are to
+ * cells of two sides alone: who looks into what is hollow and open sees its walls aslant as far as they go. */
+static const float slant[2] = { 0.65f, LID_LEAST_COSINE };
+
+static void gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius)
+{
+	const struct cell_ball *ball = &s->tree.ball[i];
+	const struct cell_node *node = &s->tree.node[i];
+	float away[3];
+
+	v3f_sub(away, ball->middle, middle);
+	if (v3f_dot(away, away) > (ball->radius + radius) * (ball->radius + radius))
+		return;
+	if (!cell_node_is_leaf(node)) {
+		gather(nearby, s, 2 * i + 1, middle, radius);
+		gather(nearby, s, 2 * i + 2, middle, radius);
+		return;
+	}
+	if (!ARRAY_ROOM(nearby->near, nearby->n, nearby->room)) {
+		nearby->is_failed = 1;
+		return;
+	}
+	nearby->near[nearby->n++].lid = &s->lid[s->tree.order[node->begin]];
+}
+
+/* Stops those of the open rays that the lid is in the way of. Returns how many are left. */
+static int stop_rays(uint8_t *is_stopped, int n_open, int n, const struct lid *lid, const float p[3],
+                     const float (*from)[3], float behind)
+{
+	for (int d = 0; d < n; d++)
+		if (!is_stopped[d] && lid_stops(lid, p, from[d], d < STEEP ? behind : GRAZED * behind)) {
+			is_stopped[d] = 1;
+			n_open--;
+		}
+	return n_open;
+}
+
+/* Lids over the place come first: they stop most rays. */
+static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, const float at[3],
+                        const float (*from)[3], const float normal[3], int n)
+{
+	int n_open = n;
+	uint8_t is_stopped[DIRECTIONS] = { 0 };
+
+	for (size_t i = 0; i < nearby->n; i++) {
+		struct near_lid *near = &nearby->near[i];
+
+		rectangle_sees(near->place, &near->lid->rectangle, at);
+		if (lid_stops_all(near->lid, near->place, normal, n > STEEP ? GRAZING : LID_LEAST_COSINE, s->behind))
+			return 1;
+	}
+	for (int is_over = 1; is_over >= 0; is_over--)
+		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+			const struct near_lid *near = &nearby->near[i];
+			const float *p = near->place, *extent = near->lid->rectangle.extent;
+
+			if ((fabsf(p[0]) <= extent[0] && fabsf(p[1]) <= extent[1]) == is_over)
+				n_open = stop_rays(is_stopped, n_open, n, near->lid, p, from, s->behind);
+		}
+	return n_open == 0;
+}
+
+/* Where rays to a cell come from: its plane's normal, and around it. Returns 0 of a cell without an area. */
+static int directions(float (*from)[3], const struct sealing *s, const struct dpoint_cell *cell)
+{
+	float a[3], b[3], x[3], y[3], normal[3];
+
+	v3f_sub(a, cell->corner[2], cell->corner[0]);
+	v3f_sub(b, cell->corner[3], cell->corner[1]);
+	v3f_cross(normal, a, b);
+	if (v3f_normalize(normal, normal) == 0)
+		return 0;
+	if (v3f_dot(normal, cell->normal) < 0)
+		v3f_scale(normal, normal, -1);
+	dpoint_tangents(x, y, normal);
+	memcpy(from[0], normal, sizeof from[0]);
+	for (int d = 1; d < DIRECTIONS; d++) {
+		const float cosine = d >= STEEP ? GRAZING : slant[(d - 1) / AROUND], sine = sqrtf(1 - cosine * cosine);
+		const float *turn = s->around[d >= STEEP ? d - STEEP : 2 * ((d - 1) % AROUND) + 1];
+
+		v3f_scale(from[d], normal, cosine);
+		v3f_add_scaled(from[d], from[d], sine * turn[0], x);
+		v3f_add_scaled(from[d], from[d], sine * turn[1], y);
+	}
+	return 1;
+}
+
+/* Brings lids over the place to the front: there they are asked first. */
+static void put_first(struct nearby *nearby, const float at[3])
+{
+	size_t n = 0;
+
+	for (size_t i = 0; i < nearby->n; i++) {
+		const struct near_lid near = nearby->near[i];
+		const struct rectangle *r = &near.lid->rectangle;
+		float p[3];
+
+		rectangle_sees(p, r, at);
+		if (fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]) {
+			nearby->near[i] = nearby->near[n];
+			nearby->near[n++] = near;
+		}
+	}
+}
+
+static void place_of(float place[3], const struct dpoint_cell *cell, const float middle[3], int p)
+{
+	const float *corner = cell->corner[p % 4], *next = cell->corner[(p + (p >= 4)) % 4];
+
+	for (int k = 0; k < 3; k++)
+		place[k] = p == 8 ? middle[k] : middle[k] + INWARDS * (0.5f * (corner[k] + next[k]) - middle[k]);
+}
+
+/* Whether the lid alone stops all rays to a cell of one side: most cells have such a one among those that cover
+ * them. */
+static int stops_all(const struct sealing *s, const struct lid *lid, const struct dpoint_cell *cell,
+                     const float middle[3], const float normal[3])
+{
+	if (dpoint_is_two_sided(s->options, cell->part))
+		return 0;
+	for (int p = PLACES; p-- > 0;) {
+		float place[3], seen[3];
+
+		place_of(place, cell, middle, p);
+		rectangle_sees(seen, &lid->rectangle, place);
+		if (!lid_stops_all(lid, seen, normal, LID_LEAST_COSINE, s->behind))
+			return 0;
+	}
+	return 1;
+}
+
+/* Whether these lids stop all rays to the cell, from both sides if it has two. */
+static int stops_rays(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
+                      const float (*from)[DIRECTIONS][3], const float middle[3])
+{
+	const int n_sides = 1 + dpoint_is_two_sided(s->options, cell->part);
+
+	for (int side = 0; side < n_sides; side++)
+		for (int p = 0; p < PLACES; p++) {
+			float place[3];
+
+			place_of(place, cell, middle, p);
+			if (!is_sealed_at(s, nearby, place, from[side], from[side][0], n_sides == 1 ? STEEP : DIRECTIONS))
+				return 0;
+		}
+	return 1;
+}
+
+/* The lines in which a lid's saddle does not bend, as rays that graze a cell. */
+static void directions_along(float (*from)[3], const struct rectangle *r, const float normal[3])
+{
+	const float u = sqrtf(-r->rho);
+
+	for (int d = 0; d < ALONG_SADDLE; d++) {
+		const float away[3] = { d & 1 ? u : -u, d & 2 ? 1 : -1, 0 };
+		float along[3];
+
+		m3f_apply_transposed(along, (const float (*)[3])r->axis, away);
+		v3f_add_scaled(along, along, -v3f_dot(along, normal), normal);
+		v3f_normalize(along, along);
+		v3f_scale(from[d], normal, GRAZING);
+		v3f_add_scaled(from[d], from[d], sqrtf(1 - GRAZING * GRAZING), along);
+	}
+}
+
+/* A saddle over a place, and as high as the surface there; NULL: none. */
+static const struct rectangle *find_saddle(const struct sealing *s, const struct nearby *nearby, const float at[3])
+{
+	for (size_t i = 0; i < nearby->n; i++) {
+		const struct rectangle *r = &nearby->near[i].lid->rectangle;
+		float p[3];
+
+		if (r->rho > -LEAST_SADDLE)
+			continue;
+		rectangle_sees(p, r, at);
+		if (fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1] &&
+		    fabsf(p[2] - dpoint_quadric_at(r->lambda_u, r->rho, p[0], p[1])) <= s->options->height)
+			return r;
+	}
+	return NULL;
+}
+
+static int stops_along(const struct sealing *s, const struct nearby *nearby, const struct dpoint_cell *cell,
+                       const float (*from)[3], const float middle[3])
+{
+	for (int p = 0; p < PLACES; p++) {
+		int n_open = ALONG_SADDLE;
+		uint8_t is_stopped[ALONG_SADDLE] = { 0 };
+		float place[3], seen[3];
+
+		place_of(place, cell, middle, p);
+		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+			rectangle_sees(seen, &nearby->near[i].lid->rectangle, place);
+			n_open = stop_rays(is_stopped, n_open, ALONG_SADDLE, nearby->near[i].lid, seen, from, GRAZED * s->behind);
+		}
+		if (n_open > 0)
+			return 0;
+	}
+	return 1;
+}
+
+/* A saddle's surface goes on straight along two lines: who looks along one sees it graze for long, and an outline may
+ * end there, with the surface behind it. So such rays to cells of one side are looked at as well. Curvatures of meshes
+ * are too rough for that. */
+static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
+                           const float middle[3], const float normal[3], float radius)
+{
+	float from[ALONG_SADDLE][3];
+
+	if (s->surface->facets.n > 0 || dpoint_is_two_sided(s->options, cell->part))
+		return 1;
+	nearby->n = 0;
+	gather(nearby, s, 0, middle, radius);
+	const struct rectangle *saddle = find_saddle(s, nearby, middle);
+	if (saddle == NULL)
+		return 1;
+	directions_along(from, saddle, normal);
+	if (stops_along(s, nearby, cell, (const float (*)[3])from, middle))
+		return 1;
+	nearby->n = 0;
+	gather(nearby, s, 0, middle, radius + 2 * GRAZED * s->behind);
+	return stops_along(s, nearby, cell, (const float (*)[3])from, middle);
+}
+
+/* Those that are over the cell stop most: others are asked only where these do not. */
+int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
+{
+	const struct dpoint_cell *cell = &s->surface->cell[at];
+	float from[2][DIRECTIONS][3], middle[3], radius = 0, away[3];
+
+	if (cell->part == DPOINT_BEYOND || !directions(from[0], s, cell))
+		return 1;
+	for (int d = 0; d < DIRECTIONS; d++)
+		v3f_scale(from[1][d], from[0][d], -1);
+	dpoint_cell_middle(middle, cell);
+	for (int c = 0; c < 4; c++) {
+		v3f_sub(away, cell->corner[c], middle);
+		radius = fmaxf(radius, v3f_length(away));
+	}
+	if (!is_sealed_along(s, nearby, cell, middle, from[0][0], radius))
+		return 0;
+	if (s->over != NULL && s->over[at] != UINT32_MAX && stops_all(s, &s->lid[s->over[at]], cell, middle, from[0][0]))
+		return 1;
+	for (int is_all = 0; is_all < 2; is_all++) {
+		nearby->n = 0;
+		gather(nearby, s, 0, middle, radius + (is_all ? 2 * s->behind : 0));
+		put_first(nearby, middle);
+		if (stops_rays(s, nearby, cell, (const float (*)[DIRECTIONS][3])from, middle))
+			return 1;
+	}
+	return 0;
+}
+
