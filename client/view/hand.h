@@ -35,6 +35,7 @@ struct hand {
 	struct psr_camera camera; /* of the pose, complete */
 	double pivot[3];          /* world */
 	enum hand_grip grip;      /* of the drag that is on; inertia may outlive it */
+	int has_dragged;          /* 0: the grip only holds yet */
 	int has_inertia;          /* 1 at first: what is let go in motion goes on, slower and slower */
 
 	double box_min[3], box_max[3], up[3];
@@ -85,8 +86,9 @@ void hand_fly(struct hand *hand, const double direction[3]);
 
 /* Flies, and goes on by inertia, up to now. 1: the camera has changed. */
 int hand_tick(struct hand *hand, uint64_t now_ns);
-int hand_is_moving(const struct hand *hand); /* a drag, inertia or a flight is on */
-void hand_stop(struct hand *hand);           /* ends them */
+/* A drag, inertia or a flight is on. A hand that only holds is at rest, so a click reads a picture at rest. */
+int hand_is_moving(const struct hand *hand);
+void hand_stop(struct hand *hand); /* ends them */
 
 /* ---- places ---- */
 

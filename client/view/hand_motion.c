@@ -81,6 +81,7 @@ void hand_grab(struct hand *hand, enum hand_grip grip, struct hand_cursor at, do
 {
 	hand->glide = HAND_NONE;
 	hand->grip = grip;
+	hand->has_dragged = 0;
 	hand->at = at;
 	hand->speed = (struct hand_cursor){ 0, 0 };
 	hand->moved_ns = now_ns;
@@ -101,6 +102,7 @@ void hand_drag(struct hand *hand, struct hand_cursor at, uint64_t now_ns)
 		hand->speed.y += part * ((at.y - hand->at.y) / seconds - hand->speed.y);
 	}
 	hand->moved_ns = now_ns;
+	hand->has_dragged = 1;
 	drag(hand, hand->grip, at);
 }
 
@@ -185,5 +187,5 @@ int hand_tick(struct hand *hand, uint64_t now_ns)
 
 int hand_is_moving(const struct hand *hand)
 {
-	return hand->grip != HAND_NONE || hand->glide != HAND_NONE || is_flying(hand);
+	return (hand->grip != HAND_NONE && hand->has_dragged) || hand->glide != HAND_NONE || is_flying(hand);
 }

@@ -314,6 +314,29 @@ static void a_hand_that_stands_still_lets_go_without_inertia(void **unused)
 	assert_int_equal(hand_is_moving(&hand), 0);
 }
 
+static void a_hand_that_only_holds_is_at_rest(void **unused)
+{
+	const struct hand_cursor at = { 300, 240 };
+	struct hand hand, before;
+
+	(void)unused;
+	state = 12;
+	random_hand(&hand, 35);
+	drag(&hand, HAND_ORBIT, at, (struct hand_cursor){ 400, 240 }, INFINITY);
+	assert_true(hand_is_moving(&hand));
+	hand_release(&hand, SECOND + SECOND / 10);
+	assert_true(hand_is_moving(&hand));
+	before = hand;
+	hand_grab(&hand, HAND_ORBIT, at, INFINITY, 2 * SECOND); /* catches what glides */
+	assert_false(hand_is_moving(&hand));
+	assert_int_equal(hand_tick(&hand, 3 * SECOND), 0);
+	assert_memory_equal(&hand.pose, &before.pose, sizeof hand.pose);
+	hand_drag(&hand, at, 3 * SECOND);
+	assert_true(hand_is_moving(&hand));
+	hand_release(&hand, 4 * SECOND);
+	assert_false(hand_is_moving(&hand));
+}
+
 static void flight_crosses_the_box_in_four_seconds(void **unused)
 {
 	static const double forwards[3] = { 0, 0, 1 }, rest[3] = { 0, 0, 0 };
@@ -438,6 +461,7 @@ int main(void)
 		cmocka_unit_test(six_sides_and_home),
 		cmocka_unit_test(inertia_decays_and_can_be_off),
 		cmocka_unit_test(a_hand_that_stands_still_lets_go_without_inertia),
+		cmocka_unit_test(a_hand_that_only_holds_is_at_rest),
 		cmocka_unit_test(flight_crosses_the_box_in_four_seconds),
 		cmocka_unit_test(the_pivot_comes_from_the_depth_below_the_cursor),
 		cmocka_unit_test(ortho_and_back_keeps_the_pivots_plane),
