@@ -19,6 +19,7 @@
 #include "measure/calibrate.h"
 #include "model/points.h"
 #include "model/tree.h"
+#include "notes.h"
 #include "octree.h"
 #include "points.h"
 #include "progress.h"
@@ -52,27 +53,6 @@ static char *default_output(const char *in)
 		memcpy(out + stem, ".psr", sizeof ".psr");
 	}
 	return out;
-}
-
-static void warn(const struct psr_mesh *mesh)
-{
-	if (mesh->warning[0] != '\0')
-		fprintf(stderr, PROGRAM ": warning: %s\n", mesh->warning);
-	if (mesh->n_dropped_primitives != 0)
-		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " points and lines were left out\n", mesh->n_dropped_primitives);
-}
-
-/* Of materials, not of the coverage of things narrower than a sample. */
-static void warn_of_sheer(const struct psr_model *model)
-{
-	const struct psr_blocks *blocks = psr_model_blocks(model);
-	uint32_t n = 0;
-
-	for (uint32_t b = 0; b < blocks->n_blocks; b++)
-		n += psr_blocks_is_sheer(blocks, b) && (psr_blocks_traits(blocks, b) & PSR_BLOCK_THIN) == 0;
-	if (n != 0)
-		fprintf(stderr, PROGRAM ": note: %" PRIu32 " of %" PRIu32 " blocks are of surfaces that let light through (BLEND "
-		        "materials); each pixel shows the nearest eight, without refraction\n", n, blocks->n_blocks);
 }
 
 /* The wishes of the command line. */
@@ -212,9 +192,13 @@ static int build(const char *in, const char *out, const struct wish *wish, struc
 		progress_clear();
 	if (code == PSR_OK && !wish->quiet) {
 		if (made.mesh != NULL)
-			warn(made.mesh);
+			notes_of_import(made.mesh);
 		if (made.blocks != NULL)
-			warn_of_sheer(made.blocks);
+			notes_of_blocks(made.blocks);
+		if (made.mesh != NULL && wish->is_octree)
+			notes_of_octree(made.mesh);
+		if (made.mesh != NULL && wish->is_points)
+			notes_of_points(made.mesh);
 		points_warn(&made.points, wish->points.error);
 		summarize(out, &made);
 	}

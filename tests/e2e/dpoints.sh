@@ -110,3 +110,37 @@ psr-model build "$work/pencil.glb" -r 64 -o "$work/pencil.psr" >/dev/null 2>"$wo
 psr-model info "$work/pencil.psr" --json >"$work/pencil.json"
 is "info counts as many sheer blocks as the build's note" "$(sed -n 's/.*note: \([0-9]*\) of .*/\1/p' "$work/said" | grep . || echo 0)" \
 	"$(number "$work/pencil.json" sheer)"
+
+# Triangles that let light through, those of BLEND materials that are opaque, and normal maps.
+positions=AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/ # and texture coordinates
+map=iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNoaPgPAAODAgAApfuJAAAAAElFTkSuQmCC # one pixel: +z
+looks() { # material...: a triangle of each
+	local n=$#
+	printf '{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [ { "nodes": [ %s ] } ],
+	"nodes": [ %s ], "meshes": [ %s ], "materials": [ %s ], "textures": [ { "source": 0 } ],
+	"images": [ { "uri": "data:image/png;base64,%s" } ],
+	"buffers": [ { "byteLength": 60, "uri": "data:application/octet-stream;base64,%s" } ],
+	"bufferViews": [ { "buffer": 0, "byteLength": 36 }, { "buffer": 0, "byteOffset": 36, "byteLength": 24 } ],
+	"accessors": [ { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [ 0, 0, 0 ], "max": [ 1, 1, 0 ] },
+	{ "bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2" } ] }\n' \
+		"$(seq -s , 0 $((n - 1)))" \
+		"$(for i in $(seq 0 $((n - 1))); do printf '{ "mesh": %d, "translation": [ %d, 0, 0 ] },' $i $((2 * i)); done | sed 's/,$//')" \
+		"$(for i in $(seq 0 $((n - 1))); do printf '{ "primitives": [ { "attributes": { "POSITION": 0, "TEXCOORD_0": 1 },
+			"material": %d } ] },' $i; done | sed '$s/,$//')" "$(printf '%s,' "$@" | sed 's/,$//')" $map $positions
+}
+glass='{ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [ 1, 1, 1, 0.5 ] } }'
+paint='{ "alphaMode": "BLEND" }' bumps='{ "normalTexture": { "index": 0 } }'
+looks "$glass" "$paint" "$bumps" "$bumps" >"$work/looks.gltf"
+looks "$paint" >"$work/paint.gltf"
+build_looks() { psr-model build "$work/looks.gltf" --representation "$1" -r 32 -o "$work/looks.psr" 2>"$work/said" >/dev/null; }
+has_notes() { [ "$(grep -c 'note: ' "$work/said")" = "$1" ]; }
+for kind in octree both dpoints; do
+	check "$kind of glass" build_looks $kind
+	check "$kind of glass: what is drawn opaque is counted" grep -q 'note: 1 of 4 triangles are of surfaces that let light' "$work/said"
+done
+check "so are normal maps that are not drawn" grep -q 'note: 2 of 4 triangles have normal maps' "$work/said"
+check "blocks draw them all" build_looks blocks
+check "and say of glass what they do" grep -q 'blocks are of surfaces that let light through' "$work/said"
+check "no more" has_notes 1
+psr-model build "$work/paint.gltf" --representation dpoints -r 32 -o "$work/looks.psr" 2>"$work/said" >/dev/null
+check "what is opaque has no note" has_notes 0
