@@ -31,7 +31,9 @@
 #include "codes.h"
 #include "base/pool.h"
 
+#ifndef OCTREE_CHUNK /* builds for sanitizers have smaller ones */
 #define OCTREE_CHUNK (1u << 20)
+#endif
 #define OCTREE_MOST_STEPS OCTREE_MOST_LEVELS
 #define OCTREE_STEP_LEVELS 2   /* depths of a step: it has some 16 times the leaves of the one before */
 #define OCTREE_FIRST_STEP 4096 /* a step of so few leaves is the first */

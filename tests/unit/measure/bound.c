@@ -132,7 +132,8 @@ static double draw(struct drawn *drawn, const struct fixture *f, double magnific
 	drawn->bound = frame.report.error_px;
 	const double most = accuracy.distance_max;
 	leave_unfilled(drawn);
-	assert_int_equal(psr_accuracy_measure(&accuracy, &shot, drawn->without, pixel, NULL), PSR_OK);
+	if (drawn->n_filled > 0)
+		assert_int_equal(psr_accuracy_measure(&accuracy, &shot, drawn->without, pixel, NULL), PSR_OK);
 	drawn->unfilled = accuracy.n_compared > 0 ? accuracy.distance_max : 0;
 	return most;
 }

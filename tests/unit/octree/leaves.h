@@ -4,7 +4,11 @@
 
 #include <stdlib.h>
 #include "base/random.h"
-#include "octree/octree.h"
+#include "octree/pack.h"
+
+/* Of twice as many places as a chunk has leaves, this many at random leave out 1 / e^0.75 = 47 %: more than one chunk. */
+#define CHUNKS_LEVELS (OCTREE_CHUNK == 1u << 20 ? 7 : 6)
+#define CHUNKS_LEAVES (OCTREE_CHUNK / 2 * 3)
 
 struct leaves {
 	uint64_t *path; /* in Morton order, each once */

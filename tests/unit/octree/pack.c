@@ -20,7 +20,7 @@ static struct octree *make(int levels, size_t n_random)
 static const struct {
 	int levels;
 	size_t n;
-} forms[] = { { 2, 5 }, { 6, 0 }, { 7, 0 }, { 12, 3000 }, { 20, 1000 }, { 20, 1 }, { 7, 1500000 } };
+} forms[] = { { 2, 5 }, { 6, 0 }, { 7, 0 }, { 12, 3000 }, { 20, 1000 }, { 20, 1 }, { CHUNKS_LEVELS, CHUNKS_LEAVES } };
 
 static void an_unpacked_tree_is_the_packed_one(void **state)
 {
@@ -42,10 +42,9 @@ static void an_unpacked_tree_is_the_packed_one(void **state)
 		}
 }
 
-/* 1.1 million leaves of 2^21 are two chunks at least. */
 static void threads_pack_the_same_bytes_and_unpack_the_same_tree(void **state)
 {
-	struct octree *tree = make(7, 1500000), *again;
+	struct octree *tree = make(CHUNKS_LEVELS, CHUNKS_LEAVES), *again;
 	struct octree_shares shares;
 	struct psr_pool *pool;
 	uint8_t *bytes, *other;

@@ -103,10 +103,9 @@ static void a_small_tree_is_one_step(void **state)
 	unmake(&p);
 }
 
-/* Of 2^21 places 1.1 million are leaves: two chunks at least. */
 static void steps_of_several_chunks_are_the_same_with_threads(void **state)
 {
-	struct packed p = make(7, 1500000, 1, OCTREE_FAST);
+	struct packed p = make(CHUNKS_LEVELS, CHUNKS_LEAVES, 1, OCTREE_FAST);
 	struct psr_pool *pool;
 	struct octree *begun;
 	uint8_t *bytes;
