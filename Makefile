@@ -312,6 +312,9 @@ L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib:$$ORIGIN/../../../lib'
 # the sanitizers' time.
 $(BUILD)/tests/%.o: CFLAGS += -UNDEBUG
 $(BUILD)/tests/unit/%.o $(BUILD)/tests/hard/%.o $(BUILD)/tests/fuzz/%.o $(BUILD)/tests/simd/%.o: CFLAGS += $(TEST_O)
+ifeq ($(config),asan)
+$(BUILD)/libpsr/render/fill_%.c.o: CFLAGS += -O2
+endif
 # These look for what is to be seen themselves, ray by ray or place by place, for longer than -O2 takes to compile.
 $(addprefix $(BUILD)/tests/unit/,dpoint/bound.c.o dpoint/seal.c.o render/fill.c.o): CFLAGS += -O2
 $(BUILD)/tests/simd/forms.c.o: CFLAGS += -O3 -fno-trapping-math

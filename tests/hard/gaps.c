@@ -302,7 +302,13 @@ static void fill_light(struct light *l)
 static void sums_at_their_maxima_do_not_overflow(void **state)
 {
 	static const uint32_t size[][2] = { { 1, 1 }, { 1, 37 }, { 300, 1 }, { 33, 65 }, { 517, 259 }, { 1024, 33 } };
-	static const uint16_t value[] = { 65535, 65534, 32768, 255, 1, 0 }, least[] = { 1, 2, 16, 255 };
+	static const uint16_t value[] = {
+		65535, 255, 0,
+#ifndef __SANITIZE_ADDRESS__ /* the greatest value has the greatest sums, and no value leads elsewhere */
+		65534, 32768, 1,
+#endif
+	};
+	static const uint16_t least[] = { 1, 2, 16, 255 };
 	uint64_t seed = 1;
 
 	(void)state;
