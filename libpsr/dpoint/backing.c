@@ -31,7 +31,7 @@ static int may_back(const struct standing *s, size_t i)
 	const struct cell_ball *ball = &s->l->tree->ball[i];
 	const lanes p = sight_turned(s->frame.axis, sight_middle(ball) - s->frame.at);
 
-	return !lanes_any(~(lanes_size(p - s->at) <= sight_turned(s->frame.slant, sight_half(ball)) + s->near));
+	return lanes_all_are(lanes_size(p - s->at) <= sight_turned(s->frame.slant, sight_half(ball)) + s->near);
 }
 
 static int leaf_backs(const struct standing *s, size_t i)

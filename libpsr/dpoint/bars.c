@@ -58,6 +58,13 @@ int bars_is_behind(const struct bars *bars, float u, float v)
 	       (at > 0 && bars->bar[at - 1].at[1] <= v);
 }
 
+int bars_are_within(const struct bars *bars, const float extent[2])
+{
+	const size_t at = find_bar(bars, extent[0]);
+
+	return at > 0 && bars->bar[at - 1].at[1] < extent[1];
+}
+
 void bars_put(struct bars *bars, const struct bar *bar)
 {
 	size_t at, end;

@@ -25,6 +25,9 @@ struct bar bar_of(const float corner[4][3], const float above[4], float height);
 /* Returns whether a bar is nearer along both sides: what is behind it ends nothing. */
 int bars_is_behind(const struct bars *bars, float u, float v);
 
+/* Returns whether a bar is within the extents. */
+int bars_are_within(const struct bars *bars, const float extent[2]);
+
 /* Adds a bar, unless it is behind another one, and takes away what is behind it. Sets is_failed without memory. */
 void bars_put(struct bars *bars, const struct bar *bar);
 

@@ -41,7 +41,7 @@ static void search(struct found *found, const struct within *w, size_t i, uint32
 	const int is_leaf = end - begin == 1;
 	float p[3];
 
-	if (lanes_any(~(lanes_size(seen) <= w->limit + sight_turned(w->frame.slant, sight_half(ball)))))
+	if (!lanes_all_are(lanes_size(seen) <= w->limit + sight_turned(w->frame.slant, sight_half(ball))))
 		return;
 	memcpy(p, &seen, sizeof p);
 	if (is_leaf && !rectangle_covers(l, w->rectangle, &l->surface->cell[l->tree->order[begin]]))

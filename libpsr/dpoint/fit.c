@@ -11,6 +11,7 @@
 
 #define CHUNK 256    /* candidates */
 #define FIRST 0.125f /* of an extent: where growing begins */
+#define LEAP 2       /* steps of growing that one look tries at once */
 /* Nodes that a step of growing may look at: beyond, a rectangle stays as it is. So time is bounded. */
 #define MOST_LOOKED 2048
 #define LEAST_LOOKED 256
@@ -29,6 +30,8 @@ struct search {
 	                 * nothing would end otherwise */
 	int left;       /* how many nodes may still be looked at; below 0: there may be more bars */
 	size_t backing; /* is_backed() */
+	float step[LEAP][2]; /* extents of steps of growing that are tried at once with the one that is looked at */
+	int n_steps;
 };
 
 struct fitting {
@@ -48,6 +51,13 @@ unsigned dpoint_delta_class(float delta)
 		class++;
 	return class;
 }
+
+/* A node as the rectangle sees it. */
+struct sight {
+	lanes p, reach;
+	float radius;
+	int is_out; /* none of its cells can end the rectangle */
+};
 
 /* Whether the surface goes on beyond a cell as S_p does: then the cell is of another sheet, which crosses it, or lies
  * close. Cells of a cloud overlap, so that this would be so of each. */
@@ -74,11 +84,23 @@ static inline int is_beyond(const lanes corner[4], const struct search *s)
 	return lanes_any(nearest + (lanes){ s->over[0], s->over[1], 0, 0 } >= s->sides);
 }
 
+/* Whether a step of growing before this one was around the cell, and had no bar of it, which is at its side: what a step
+ * was around is not looked at again. */
+static int is_past(const struct search *s, const struct sight *sight, const struct bar *bar)
+{
+	for (int i = 0; i < s->n_steps; i++)
+		if (lanes_all_are(lanes_size(sight->p) + sight->reach <=
+		                  (lanes){ s->step[i][0], s->step[i][1], INFINITY, INFINITY }))
+			return bar->at[0] >= s->step[i][0] || bar->at[1] >= s->step[i][1];
+	return 0;
+}
+
 /* The surface that goes on beside the rectangle leaves S_p gradually: a cell that S_p runs through, or that is within
  * some heights of it, is of that surface. One that looks back is of another. */
 static void look_at(struct search *s, const struct fitting *f, const struct rectangle *r,
-                    const struct dpoint_cell *cell, float radius)
+                    const struct dpoint_cell *cell, const struct sight *sight)
 {
+	const float radius = sight->radius;
 	float corner[4][3], above[4], middle[3] = { 0, 0, 0 }, off;
 	lanes seen[4];
 	struct bar bar;
@@ -100,34 +122,40 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
 	for (int k = 0; k < 2; k++)
 		bar.at[k] += s->over[k];
 	if (bar.at[0] >= r->extent[0] || bar.at[1] >= r->extent[1] || bars_is_behind(&s->bars, bar.at[0], bar.at[1]) ||
-	    is_crossing(s, f, r, middle, radius))
+	    is_past(s, sight, &bar) || is_crossing(s, f, r, middle, radius))
 		return;
 	bars_put(&s->bars, &bar);
 }
 
-/* A node as the rectangle sees it. */
-struct sight {
-	lanes p, reach;
-	float radius, distance2;
-	int is_out; /* none of its cells can end the rectangle */
-};
-
 static inline void see(struct sight *sight, const struct search *s, const struct cell_ball *ball)
 {
 	const lanes middle = sight_middle(ball), half = sight_half(ball), away = middle - s->frame.at;
-	const lanes widest = lanes_all(half[3]), square = away * away;
+	const lanes widest = lanes_all(half[3]);
 	lanes size;
 
 	sight->radius = middle[3];
-	sight->distance2 = square[0] + square[1] + square[2];
 	sight->is_out = 1;
-	if (lanes_any(~(lanes_size(away) <= half + s->box + s->per_widest * widest)))
+	if (!lanes_all_are(lanes_size(away) <= half + s->box + s->per_widest * widest))
 		return;
 	sight->p = sight_turned(s->frame.axis, away);
 	sight->reach = sight_turned(s->frame.slant, half);
 	size = lanes_size(sight->p);
-	sight->is_out = !lanes_any(~(size + sight->reach <= s->free_one)) ||
-	                lanes_any(~(size <= s->limit + (lanes){ 0, 0, 2, 0 } * widest + sight->reach));
+	sight->is_out = lanes_all_are(size + sight->reach <= s->free_one) ||
+	                !lanes_all_are(size <= s->limit + (lanes){ 0, 0, 2, 0 } * widest + sight->reach);
+}
+
+static float distance2(const struct search *s, const struct cell_ball *ball)
+{
+	const lanes away = sight_middle(ball) - s->frame.at, square = away * away;
+
+	return square[0] + square[1] + square[2];
+}
+
+static int is_behind(const struct search *s, const struct sight *sight)
+{
+	const lanes nearest = lanes_greater(lanes_size(sight->p) - sight->reach, lanes_all(0));
+
+	return s->bars.n > 0 && bars_is_behind(&s->bars, nearest[0] + s->over[0], nearest[1] + s->over[1]);
 }
 
 /* A node of the cells begin..end of the tree's order, which is known without a look at it. */
@@ -136,47 +164,57 @@ struct below {
 	uint32_t begin, end;
 };
 
+static inline struct below half_of(const struct below *node, int second)
+{
+	const uint32_t half = node->begin + (node->end - node->begin) / 2;
+
+	return second ? (struct below){ 2 * node->i + 2, half, node->end } : (struct below){ 2 * node->i + 1, node->begin, half };
+}
+
+/* The node is not out. */
 static void look_below(struct search *s, const struct fitting *f, const struct rectangle *r, struct below node,
-                       const struct sight *sight)
+                       const struct sight *known)
 {
 	const struct cell_tree *tree = f->look.tree;
-	const lanes nearest = lanes_size(sight->p) - sight->reach;
-	const uint32_t half = node.begin + (node.end - node.begin) / 2;
-	struct sight child[2];
-	float p[3];
-	int near;
+	struct sight sight = *known, child[2];
 
-	if (sight->is_out || s->left < 0 ||
-	    bars_is_behind(&s->bars, (nearest[0] > 0 ? nearest[0] : 0) + s->over[0],
-	                   (nearest[1] > 0 ? nearest[1] : 0) + s->over[1]))
-		return;
-	if (node.end - node.begin == 1) {
-		look_at(s, f, r, &f->look.surface->cell[tree->order[node.begin]], sight->radius);
-		return;
-	}
-	memcpy(p, &sight->p, sizeof p);
-	if (rectangle_suits_node(&f->look, r, node.i, p))
-		return;
-	s->left -= 2;
-	/* Most of the time goes into waiting for balls. Those of both children's children are side by side. */
-	if (4 * node.i + 6 < tree->n_nodes)
+	while (s->left >= 0 && !is_behind(s, &sight)) {
+		const struct cell_ball *ball = &tree->ball[2 * node.i + 1];
+		int second;
+
+		if (node.end - node.begin == 1) {
+			look_at(s, f, r, &f->look.surface->cell[tree->order[node.begin]], &sight);
+			return;
+		}
+		if (rectangle_may_suit(&f->look, r, sight.radius)) {
+			float p[3];
+
+			memcpy(p, &sight.p, sizeof p);
+			if (rectangle_suits_node(&f->look, r, node.i, p))
+				return;
+		}
+		s->left -= 2;
+		/* Most of the time goes into waiting for balls. Those of both children's children are side by side. */
+		if (4 * node.i + 6 < tree->n_nodes)
+			for (size_t k = 0; k < 2; k++)
+				__builtin_prefetch(&tree->ball[4 * node.i + 3 + 2 * k]);
 		for (size_t k = 0; k < 2; k++)
-			__builtin_prefetch(&tree->ball[4 * node.i + 3 + 2 * k]);
-	for (size_t k = 0; k < 2; k++)
-		see(&child[k], s, &tree->ball[2 * node.i + 1 + k]);
-	/* The nearer half first: its bars are before most of the other's. */
-	near = child[1].distance2 < child[0].distance2;
-	for (int k = 0; k < 2; k++) {
-		const int second = k ^ near;
-
-		if (!child[second].is_out)
-			look_below(s, f, r, second ? (struct below){ 2 * node.i + 2, half, node.end }
-			                           : (struct below){ 2 * node.i + 1, node.begin, half }, &child[second]);
+			see(&child[k], s, &ball[k]);
+		if (child[0].is_out && child[1].is_out)
+			return;
+		second = child[0].is_out;
+		/* The nearer half first: its bars are before most of the other's. */
+		if (!child[0].is_out && !child[1].is_out) {
+			second = !(distance2(s, &ball[1]) < distance2(s, &ball[0]));
+			look_below(s, f, r, half_of(&node, !second), &child[!second]);
+		}
+		node = half_of(&node, second);
+		sight = child[second];
 	}
 }
 
-/* Ends the rectangle at the bars. Returns 0 if that is not known of all of them. */
-static int look_around(struct rectangle *r, const float free_one[2], struct search *s, const struct fitting *f)
+/* Finds the bars. Returns 0 if there may be more of them. */
+static int find_bars(struct rectangle *r, const float free_one[2], struct search *s, const struct fitting *f)
 {
 	const struct cell_tree *tree = f->look.tree;
 	struct sight all;
@@ -196,9 +234,45 @@ static int look_around(struct rectangle *r, const float free_one[2], struct sear
 	s->bars.n = 0;
 	s->left = f->looked - 1;
 	see(&all, s, &tree->ball[0]);
-	look_below(s, f, r, (struct below){ 0, tree->node[0].begin, tree->node[0].end }, &all);
-	bars_end(r->extent, &s->bars, free_one, f->overhang);
+	if (!all.is_out)
+		look_below(s, f, r, (struct below){ 0, tree->node[0].begin, tree->node[0].end }, &all);
 	return s->left >= 0;
+}
+
+/* Ends the rectangle at the bars. Returns 0 if that is not known of all of them. */
+static int look_around(struct rectangle *r, const float free_one[2], struct search *s, const struct fitting *f)
+{
+	const int is_all = find_bars(r, free_one, s, f);
+
+	bars_end(r->extent, &s->bars, free_one, f->overhang);
+	return is_all;
+}
+
+/* The first steps of growing mostly find no bar: one look tells how many do not. Brings `now` from where growing begins
+ * to the last of them, and is_first to 0 if there is one. Returns whether the bars are those of the step after it. */
+static int leap(float now[2], int *is_first, const float most[2], struct rectangle *r, struct search *s,
+                const struct fitting *f)
+{
+	int n = 0, n_free = 0, is_all;
+
+	memcpy(r->extent, now, sizeof r->extent);
+	for (; n < LEAP && (r->extent[0] < most[0] || r->extent[1] < most[1]); n++)
+		for (int k = 0; k < 2; k++) {
+			s->step[n][k] = r->extent[k];
+			r->extent[k] = fminf(2 * r->extent[k], most[k]);
+		}
+	s->n_steps = n;
+	is_all = n > 0 && find_bars(r, (const float[2]){ 0, 0 }, s, f);
+	s->n_steps = 0;
+	if (!is_all)
+		return 0;
+	while (n_free < n && !bars_are_within(&s->bars, s->step[n_free]))
+		n_free++;
+	if (n_free > 0) {
+		memcpy(now, s->step[n_free - 1], sizeof s->step[0]);
+		*is_first = 0;
+	}
+	return n_free == n;
 }
 
 /* Grows along u and along v until bars are in the way, or too much to look at, or the extents are those of epsilon and
@@ -208,18 +282,21 @@ static void grow(float now[2], float side[2], struct rectangle *r, struct search
 	const float most[2] = { r->extent[0], r->extent[1] };
 	/* From a square on: what a curvature makes short must not become shorter for the sake of the other side. */
 	float first = fminf(fminf(most[0], most[1]), FIRST * fmaxf(most[0], most[1]));
-	int is_growing[2] = { 1, 1 }, is_first = 1;
+	int is_growing[2] = { 1, 1 }, is_first = 1, is_known;
 
-	for (int k = 0; k < 2; k++) {
-		now[k] = first;
-		side[k] = 0;
-	}
-	while ((is_growing[0] || is_growing[1]) && !s->bars.is_failed) {
+	now[0] = now[1] = first;
+	side[0] = side[1] = 0;
+	is_known = leap(now, &is_first, most, r, s, f);
+	for (int k = 0; k < 2; k++)
+		is_growing[k] = is_first || now[k] < most[k];
+	for (; (is_growing[0] || is_growing[1]) && !s->bars.is_failed; is_known = 0) {
 		float grown[2];
 
 		for (int k = 0; k < 2; k++)
 			r->extent[k] = grown[k] = is_growing[k] && !is_first ? fminf(2 * now[k], most[k]) : now[k];
-		if (!look_around(r, is_first ? (const float[2]){ 0, 0 } : now, s, f)) {
+		if (is_known) {
+			bars_end(r->extent, &s->bars, now, f->overhang);
+		} else if (!look_around(r, is_first ? (const float[2]){ 0, 0 } : now, s, f)) {
 			if (!is_first || first < f->overhang)
 				break;
 			now[0] = now[1] = first /= 2;

@@ -150,8 +150,7 @@ int rectangle_suits_node(const struct looking *l, const struct rectangle *r, siz
 	const float u = fabsf(p[0]), v = fabsf(p[1]), away = (u > v ? u : v) + radius;
 	float n[3], normal[3], off, chord;
 
-	/* What this alone is too much for needs no look at the node. */
-	if (turn > l->chord || 1.2f * turn * radius > r->height)
+	if (!rectangle_may_suit(l, r, radius))
 		return 0;
 	chord = node->spread + turn;
 	if (node->spread >= MOST_CHORD || !(away * fabsf(r->lambda_u) <= MOST_SINE) || chord > l->chord ||

@@ -59,6 +59,14 @@ int rectangle_suits_off(const struct looking *l, const struct rectangle *r, cons
 /* Whether all corners are within the extents, and the cell suits. */
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell);
 
+/* Whether those of a sphere may suit as a whole: what its size alone is too much for needs no look at the node. */
+static inline int rectangle_may_suit(const struct looking *l, const struct rectangle *r, float radius)
+{
+	const float turn = 1.6f * radius * fabsf(r->lambda_u);
+
+	return !(turn > l->chord || 1.2f * turn * radius > r->height);
+}
+
 /* Whether all cells of a node suit, or are covered, told by its sphere, at p in the rectangle's frame, and by its
  * normals and looks alone: 0 may be wrong. */
 int rectangle_suits_node(const struct looking *l, const struct rectangle *r, size_t node, const float p[3]);

@@ -6,6 +6,9 @@
 #include <math.h>
 #include <string.h>
 #include "rectangle.h"
+#ifdef __SSE2__ /* as every x86-64 has */
+#include <emmintrin.h>
+#endif
 
 /* Four numbers, which the compiler has a register for on any machine that has some. */
 typedef float lanes __attribute__((vector_size(16)));
@@ -25,6 +28,23 @@ static inline lanes lanes_size(lanes x)
 	return (lanes)((lanes_if)x & INT32_MAX);
 }
 
+/* lanes_any, lanes_all_are: of a comparison. */
+#ifdef __SSE2__
+static inline lanes lanes_greater(lanes a, lanes b)
+{
+	return (lanes)_mm_max_ps((__m128)b, (__m128)a);
+}
+
+static inline int lanes_any(lanes_if x)
+{
+	return _mm_movemask_ps((__m128)x) != 0;
+}
+
+static inline int lanes_all_are(lanes_if x)
+{
+	return _mm_movemask_ps((__m128)x) == 15;
+}
+#else
 static inline lanes lanes_greater(lanes a, lanes b)
 {
 	const lanes_if is_greater = b > a;
@@ -39,6 +59,12 @@ static inline int lanes_any(lanes_if x)
 	memcpy(half, &x, sizeof half);
 	return (half[0] | half[1]) != 0;
 }
+
+static inline int lanes_all_are(lanes_if x)
+{
+	return !lanes_any(~x);
+}
+#endif
 
 static inline lanes sight_place(const float p[3])
 {
