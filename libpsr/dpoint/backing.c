@@ -1,6 +1,7 @@
 #include "backing.h"
 
 #include <math.h>
+#include <string.h>
 #include "sight.h"
 
 /* Whether a convex quadrilateral holds the place u, v. */
@@ -34,30 +35,39 @@ static int may_back(const struct standing *s, size_t i)
 	return lanes_all_are(lanes_size(p - s->at) <= sight_turned(s->frame.slant, sight_half(ball)) + s->near);
 }
 
-static int leaf_backs(const struct standing *s, size_t i)
+static int leaf_backs(const struct standing *s, uint32_t place)
 {
 	const struct looking *l = s->l;
-	const struct dpoint_cell *cell = &l->surface->cell[l->tree->order[l->tree->node[i].begin]];
+	const struct dpoint_cell *cell = &l->surface->cell[l->tree->order[place]];
 	float corner[4][3], middle[3] = { 0, 0, 0 };
 
 	for (int c = 0; c < 4; c++) {
-		rectangle_sees(corner[c], s->r, cell->corner[c]);
+		const lanes seen = sight_turned(s->frame.axis, sight_place(cell->corner[c]) - s->frame.at);
+
+		memcpy(corner[c], &seen, sizeof corner[c]);
 		v3f_add_scaled(middle, middle, 0.25f, corner[c]);
 	}
 	return is_in((const float (*)[3])corner, s->at[0], s->at[1]) && rectangle_suits(l, s->r, cell, middle);
 }
 
-/* Returns the leaf of a cell that backs the place, of those below a node that may; or 0. */
-static size_t backing_below(const struct standing *s, size_t i)
+/* Returns the leaf of a cell that backs the place, of those below a node that may, of the cells begin..end; or 0. */
+static size_t backing_below(const struct standing *s, size_t i, uint32_t begin, uint32_t end)
 {
+	const uint32_t half = begin + (end - begin) / 2;
 	size_t found = 0;
 
-	if (cell_node_is_leaf(&s->l->tree->node[i]))
-		return leaf_backs(s, i) ? i : 0;
-	for (size_t child = 2 * i + 1; child <= 2 * i + 2 && found == 0; child++)
-		if (may_back(s, child))
-			found = backing_below(s, child);
+	if (end - begin == 1)
+		return leaf_backs(s, begin) ? i : 0;
+	if (may_back(s, 2 * i + 1))
+		found = backing_below(s, 2 * i + 1, begin, half);
+	if (found == 0 && may_back(s, 2 * i + 2))
+		found = backing_below(s, 2 * i + 2, half, end);
 	return found;
+}
+
+static size_t backing_of(const struct standing *s, size_t i)
+{
+	return backing_below(s, i, s->l->tree->node[i].begin, s->l->tree->node[i].end);
 }
 
 /* The same of the whole tree, first near the leaf that was found last. A leaf counts where all nodes above it may back
@@ -72,12 +82,12 @@ static size_t find_backing(const struct standing *s, size_t last)
 		return 0;
 	while (n > 0 && may_back(s, way[n - 1]))
 		deepest = way[--n];
-	found = backing_below(s, deepest);
+	found = backing_of(s, deepest);
 	for (size_t i = deepest; i > 0 && found == 0; i = (i - 1) / 2) {
 		const size_t other = i % 2 == 1 ? i + 1 : i - 1;
 
 		if (may_back(s, other))
-			found = backing_below(s, other);
+			found = backing_of(s, other);
 	}
 	return found;
 }

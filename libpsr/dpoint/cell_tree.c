@@ -106,17 +106,23 @@ static int bound_places(struct cell_ball *ball, const struct cell_node *node, co
 static void bound_normals(struct cell_node *node, const struct making *m)
 {
 	float spread2 = 0;
+	uint64_t attr = m->cell[m->entry[node->begin].cell].attr; /* most are as the one before */
 
-	look_range_of(&node->looks, m->cell[m->entry[node->begin].cell].attr);
+	look_range_of(&node->looks, attr);
 	node->part = m->cell[m->entry[node->begin].cell].part;
 	v3f_set(node->normal, 0, 0, 0);
 	for (uint32_t e = node->begin; e < node->end; e++) {
-		struct look_range looks;
+		const struct dpoint_cell *cell = &m->cell[m->entry[e].cell];
 
-		look_range_of(&looks, m->cell[m->entry[e].cell].attr);
-		look_range_join(&node->looks, &looks);
-		v3f_add(node->normal, node->normal, m->cell[m->entry[e].cell].normal);
-		if (m->cell[m->entry[e].cell].part != node->part)
+		if (cell->attr != attr) {
+			struct look_range looks;
+
+			attr = cell->attr;
+			look_range_of(&looks, attr);
+			look_range_join(&node->looks, &looks);
+		}
+		v3f_add(node->normal, node->normal, cell->normal);
+		if (cell->part != node->part)
 			node->part = CELL_NO_PART;
 	}
 	v3f_normalize(node->normal, node->normal);

@@ -19,7 +19,7 @@ struct covering {
 
 struct found {
 	uint32_t *node;
-	size_t n, room;
+	size_t n, room, n_cells;
 	int is_failed;
 };
 
@@ -31,31 +31,60 @@ struct within {
 	lanes limit;
 };
 
+/* rectangle_covers(), in lanes. */
+static int covers(const struct within *w, const struct dpoint_cell *cell)
+{
+	const lanes most = { w->limit[0], w->limit[1], INFINITY, INFINITY };
+	lanes middle = lanes_all(0);
+	float at[3];
+
+	if (w->look->options->is_within_parts && cell->part != w->rectangle->part)
+		return 0;
+	for (int c = 0; c < 4; c++) {
+		const lanes p = sight_turned(w->frame.axis, sight_place(cell->corner[c]) - w->frame.at);
+
+		if (!lanes_all_are(lanes_size(p) <= most))
+			return 0;
+		middle += lanes_all(0.25f) * p;
+	}
+	memcpy(at, &middle, sizeof at);
+	return rectangle_suits(w->look, w->rectangle, cell, at);
+}
+
 /* The covered nodes of a subtree, of cells begin..end of the tree's order. */
 static void search(struct found *found, const struct within *w, size_t i, uint32_t begin, uint32_t end)
 {
 	const struct looking *l = w->look;
-	const struct cell_ball *ball = &l->tree->ball[i];
-	const lanes seen = sight_turned(w->frame.axis, sight_middle(ball) - w->frame.at);
-	const uint32_t half = begin + (end - begin) / 2;
-	const int is_leaf = end - begin == 1;
-	float p[3];
 
-	if (!lanes_all_are(lanes_size(seen) <= w->limit + sight_turned(w->frame.slant, sight_half(ball))))
-		return;
-	memcpy(p, &seen, sizeof p);
-	if (is_leaf && !rectangle_covers(l, w->rectangle, &l->surface->cell[l->tree->order[begin]]))
-		return;
-	if (!is_leaf && !rectangle_covers_node(l, w->rectangle, i, p)) {
+	for (;;) {
+		const struct cell_ball *ball = &l->tree->ball[i];
+		const lanes seen = sight_turned(w->frame.axis, sight_middle(ball) - w->frame.at), size = lanes_size(seen);
+		const uint32_t half = begin + (end - begin) / 2;
+
+		if (!lanes_all_are(size <= w->limit + sight_turned(w->frame.slant, sight_half(ball))))
+			return;
+		if (end - begin == 1) {
+			if (!covers(w, &l->surface->cell[l->tree->order[begin]]))
+				return;
+			break;
+		}
+		if (size[0] + ball->radius <= w->limit[0] && size[1] + ball->radius <= w->limit[1]) {
+			float p[3];
+
+			memcpy(p, &seen, sizeof p);
+			if (rectangle_covers_node(l, w->rectangle, i, p))
+				break;
+		}
 		search(found, w, 2 * i + 1, begin, half);
-		search(found, w, 2 * i + 2, half, end);
-		return;
+		i = 2 * i + 2;
+		begin = half;
 	}
 	if (!ARRAY_ROOM(found->node, found->n, found->room)) {
 		found->is_failed = 1;
 		return;
 	}
 	found->node[found->n++] = (uint32_t)i;
+	found->n_cells += end - begin;
 }
 
 static void search_all(struct found *found, const struct looking *l, const struct rectangle *r)
@@ -64,18 +93,6 @@ static void search_all(struct found *found, const struct looking *l, const struc
 
 	sight_frame_of(&w.frame, r);
 	search(found, &w, 0, l->tree->node[0].begin, l->tree->node[0].end);
-}
-
-size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate)
-{
-	size_t n = 0;
-
-	for (uint32_t k = 0; k < cover->n[candidate]; k++) {
-		const struct cell_node *node = &cover->tree->node[cover->list[candidate][k]];
-
-		n += node->end - node->begin;
-	}
-	return n;
 }
 
 static void keep_margin(struct rectangle *r, const struct dpoint_candidate *c,
@@ -93,12 +110,12 @@ static void look(int chunk, void *userdata)
 	struct dpoint_cover *cover = covering->cover;
 	const size_t begin = covering->first + (size_t)chunk * CHUNK;
 	const size_t end = begin + CHUNK < cover->n_candidates ? begin + CHUNK : cover->n_candidates;
-	struct found found = { NULL, 0, 0, 0 };
+	struct found found = { .node = NULL };
 	size_t at = 0;
 
 	for (size_t i = begin; i < end; i++) {
 		struct rectangle r;
-		const size_t before = found.n;
+		const size_t before = found.n, n_cells = found.n_cells;
 
 		rectangle_of(&r, &l->surface->candidate[i], l->options);
 		if (l->options->margin > 0)
@@ -107,6 +124,7 @@ static void look(int chunk, void *userdata)
 		if (r.extent[0] > 0 && r.extent[1] > 0)
 			search_all(&found, l, &r);
 		cover->n[i] = (uint32_t)(found.n - before);
+		cover->size[i] = (uint32_t)(found.n_cells - n_cells);
 	}
 	cover->chunk[covering->first_chunk + (size_t)chunk] = found.node;
 	for (size_t i = begin; i < end; i++) {
@@ -123,7 +141,7 @@ int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *su
 	struct covering covering = { .cover = cover, .first = cover->n_candidates, .first_chunk = cover->n_chunks };
 	const size_t n = surface->n_candidates, n_chunks = (n - cover->n_candidates + CHUNK - 1) / CHUNK;
 	const uint32_t **list = realloc(cover->list, (n + 1) * sizeof *list);
-	uint32_t *counts;
+	uint32_t *counts, *sizes;
 	void **chunk;
 	int rc;
 
@@ -132,10 +150,13 @@ int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *su
 	counts = realloc(cover->n, (n + 1) * sizeof *counts);
 	if (counts != NULL)
 		cover->n = counts;
+	sizes = realloc(cover->size, (n + 1) * sizeof *sizes);
+	if (sizes != NULL)
+		cover->size = sizes;
 	chunk = realloc(cover->chunk, (cover->n_chunks + n_chunks + 1) * sizeof *chunk);
 	if (chunk != NULL)
 		cover->chunk = chunk;
-	if (list == NULL || counts == NULL || chunk == NULL)
+	if (list == NULL || counts == NULL || sizes == NULL || chunk == NULL)
 		return PSR_ERR_MEMORY;
 	memset(chunk + cover->n_chunks, 0, n_chunks * sizeof *chunk);
 	memset(counts + cover->n_candidates, 0, (n - cover->n_candidates) * sizeof *counts);
@@ -174,5 +195,6 @@ void dpoint_cover_fini(struct dpoint_cover *cover)
 	free(cover->tree);
 	free(cover->list);
 	free(cover->n);
+	free(cover->size);
 	memset(cover, 0, sizeof *cover);
 }

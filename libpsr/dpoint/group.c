@@ -3,22 +3,20 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/radix.h"
 #include "base/vec.h"
 
+#define MORTON_BITS 30
+
 /* Sides and deltas first, then the place. */
-struct key {
-	uint32_t kind, morton, candidate;
-};
-
-static int compare(const void *a, const void *b)
+static uint64_t key_of(uint32_t kind, uint32_t morton)
 {
-	const struct key *x = a, *y = b;
+	return (uint64_t)kind << MORTON_BITS | morton;
+}
 
-	if (x->kind != y->kind)
-		return x->kind < y->kind ? -1 : 1;
-	if (x->morton != y->morton)
-		return x->morton < y->morton ? -1 : 1;
-	return x->candidate < y->candidate ? -1 : x->candidate > y->candidate;
+static uint32_t kind_of_key(const struct radix_entry *key)
+{
+	return (uint32_t)(key->key >> MORTON_BITS);
 }
 
 /* Ten bits an axis of -1..1. */
@@ -36,15 +34,17 @@ static uint32_t morton_of(const float at[3])
 }
 
 /* How many of the keys can be one group. */
-static uint32_t cut(float low[3], float high[3], const struct key *key, size_t n, const struct dpoint_surface *surface)
+static uint32_t cut(float low[3], float high[3], const struct radix_entry *key, size_t n,
+                    const struct dpoint_surface *surface)
 {
+	const uint32_t kind = kind_of_key(key);
 	uint32_t count = 0;
 
 	for (; count < n && count < DPOINT_GROUP; count++) {
-		const float *at = surface->candidate[key[count].candidate].point.at;
+		const float *at = surface->candidate[key[count].value].point.at;
 		float lower[3], higher[3], most = 0;
 
-		if (key[count].kind != key->kind)
+		if (kind_of_key(&key[count]) != kind)
 			break;
 		for (int k = 0; k < 3; k++) {
 			lower[k] = count > 0 ? fminf(low[k], at[k]) : at[k];
@@ -70,41 +70,47 @@ static uint32_t kind_of(const struct dpoint_candidate *c, const uint8_t *two_sid
 /* Groups before they are in their order: the first key of each. */
 struct cut_group {
 	struct dpoint_group group;
-	struct key key; /* kind 0, of its middle; candidate: the first of its keys */
+	uint32_t morton, first; /* of its middle; of its keys */
 };
 
 static int compare_groups(const void *a, const void *b)
 {
-	return compare(&((const struct cut_group *)a)->key, &((const struct cut_group *)b)->key);
+	const struct cut_group *x = a, *y = b;
+
+	if (x->morton != y->morton)
+		return x->morton < y->morton ? -1 : 1;
+	return x->first < y->first ? -1 : x->first > y->first;
 }
 
-static size_t cut_all(struct cut_group *to, const struct key *key, size_t n, const struct dpoint_surface *surface)
+static size_t cut_all(struct cut_group *to, const struct radix_entry *key, size_t n,
+                      const struct dpoint_surface *surface)
 {
 	size_t n_groups = 0;
 
 	for (size_t i = 0; i < n; i += to[n_groups - 1].group.n) {
 		struct cut_group *cut_group = &to[n_groups++];
 		struct dpoint_group *g = &cut_group->group;
+		const uint32_t kind = kind_of_key(&key[i]);
 		float low[3], high[3], middle[3];
 
 		memset(cut_group, 0, sizeof *cut_group);
 		g->n = (uint8_t)cut(low, high, &key[i], n - i, surface);
-		g->delta[0] = (uint8_t)(key[i].kind >> 8);
-		g->delta[1] = (uint8_t)key[i].kind;
-		g->flags = key[i].kind >> 16 ? DPOINT_TWO_SIDED : 0;
+		g->delta[0] = (uint8_t)(kind >> 8);
+		g->delta[1] = (uint8_t)kind;
+		g->flags = kind >> 16 ? DPOINT_TWO_SIDED : 0;
 		dpoint_box_make(&g->box, low, high);
 		for (int k = 0; k < 3; k++)
 			middle[k] = 0.5f * (low[k] + high[k]);
-		cut_group->key = (struct key){ 0, morton_of(middle), (uint32_t)i };
+		cut_group->morton = morton_of(middle);
+		cut_group->first = (uint32_t)i;
 	}
-	qsort(to, n_groups, sizeof *to, compare_groups);
 	return n_groups;
 }
 
 /* The kept candidates and their groups. */
 struct making {
 	const struct dpoint_grouping *grouping;
-	struct key *key;
+	struct radix_entry *key; /* the value is a candidate */
 	struct cut_group *cut_group;
 	size_t n, n_groups;
 };
@@ -118,9 +124,10 @@ static void group_all(struct making *m, int has_own)
 		const struct dpoint_candidate *c = &surface->candidate[i];
 
 		if (m->grouping->choice->is_kept[i])
-			m->key[m->n++] = (struct key){ kind_of(c, m->grouping->is_two_sided, has_own), morton_of(c->point.at), i };
+			m->key[m->n++] = (struct radix_entry){
+				key_of(kind_of(c, m->grouping->is_two_sided, has_own), morton_of(c->point.at)), i };
 	}
-	qsort(m->key, m->n, sizeof *m->key, compare);
+	radix_sort(m->key, m->n);
 	m->n_groups = cut_all(m->cut_group, m->key, m->n, surface);
 }
 
@@ -146,12 +153,12 @@ static void put_words(struct dpoint_set *set, struct dpoint_group *group, struct
                       const struct making *m)
 {
 	for (uint32_t i = 0; i < set->n_groups; i++) {
-		const struct key *first = &m->key[m->cut_group[i].key.candidate];
+		const struct radix_entry *first = &m->key[m->cut_group[i].first];
 
 		group[i] = m->cut_group[i].group;
 		group[i].first = set->n_points;
 		for (uint32_t k = 0; k < group[i].n; k++) {
-			const struct dpoint_candidate *c = &m->grouping->surface->candidate[first[k].candidate];
+			const struct dpoint_candidate *c = &m->grouping->surface->candidate[first[k].value];
 
 			for (int side = 0; side < 2 && delta != NULL; side++)
 				delta[set->n_points][side] = (uint8_t)dpoint_delta_class(c->delta[side]);
@@ -163,7 +170,7 @@ static void put_words(struct dpoint_set *set, struct dpoint_group *group, struct
 int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *grouping)
 {
 	const size_t room = grouping->choice->n_kept + 1;
-	struct making m = { .grouping = grouping, .key = malloc(room * sizeof *m.key),
+	struct making m = { .grouping = grouping, .key = malloc(2 * room * sizeof *m.key),
 		                .cut_group = malloc(room * sizeof *m.cut_group) };
 	struct dpoint_group *group = malloc(room * sizeof *group);
 	struct dpoint_word *word = malloc(room * sizeof *word);
@@ -178,6 +185,7 @@ int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *groupi
 		rc = delta == NULL ? PSR_ERR_MEMORY : PSR_OK;
 	}
 	if (rc == PSR_OK) {
+		qsort(m.cut_group, m.n_groups, sizeof *m.cut_group, compare_groups);
 		set->n_groups = (uint32_t)m.n_groups;
 		put_words(set, group, word, delta, &m);
 	}

@@ -36,6 +36,20 @@ static uint64_t look_of_mean(const struct mean *mean, int looks)
 	return attr;
 }
 
+/* Whether the candidate covers a cell of another look than its own. */
+static int is_mixed(const struct dpoint_candidate *c, const struct dpoint_surface *surface,
+                    const struct dpoint_cover *cover, uint32_t i)
+{
+	for (uint32_t k = 0; k < cover->n[i]; k++) {
+		const struct cell_node *node = &cover->tree->node[cover->list[i][k]];
+
+		for (uint32_t e = node->begin; e < node->end; e++)
+			if (((surface->cell[cover->tree->order[e]].attr ^ c->point.attr) & ~(uint64_t)LOOK_NORMAL) != 0)
+				return 1;
+	}
+	return 0;
+}
+
 static void paint_one(struct dpoint_candidate *c, const struct dpoint_surface *surface, const struct dpoint_cover *cover,
                       uint32_t i, int looks)
 {
@@ -59,6 +73,6 @@ void paint(struct dpoint_surface *surface, const struct dpoint_choice *choice, c
            const struct dpoint_cover_options *options)
 {
 	for (uint32_t i = 0; i < cover->n_candidates; i++)
-		if (choice->is_kept[i])
+		if (choice->is_kept[i] && is_mixed(&surface->candidate[i], surface, cover, i))
 			paint_one(&surface->candidate[i], surface, cover, i, options->looks);
 }

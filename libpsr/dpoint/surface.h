@@ -105,13 +105,16 @@ struct dpoint_cover {
 	size_t n_candidates, n_cells;
 	const uint32_t **list;   /* of a candidate: nodes of the tree, all of whose cells it covers, each once */
 	uint32_t *n;
+	uint32_t *size;          /* how many cells these have */
 	struct cell_tree *tree;  /* cell_tree.h; NULL without cells or candidates */
 	void **chunk;            /* what the lists are in */
 	size_t n_chunks;
 };
 
-/* Returns how many cells a candidate covers. */
-size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate);
+static inline size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate)
+{
+	return cover->size[candidate];
+}
 
 /* MEMORY, CANCELLED; dpoint_cover_fini() even then. pool and cancel may be NULL. */
 int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *surface,

@@ -6,13 +6,18 @@
 
 #define LEAST_GAIN 150 /* a turn that saves less than one of so many is the last */
 
-/* By cell, in the order of the tree: how many kept candidates are over it, and the sum of their indices, which tells
- * the one that is alone. By candidate: over how many cells a kept one is alone, and how many of these are `lost` to the
+/* How many kept candidates are over a cell, and the sum of their indices, which tells the one that is alone. */
+struct over {
+	uint32_t n, sum;
+};
+
+/* over: by cell, in the order of the tree. By candidate: over how many cells a kept one is alone, and how many of these are `lost` to the
  * one that is looked at. */
 struct swapping {
 	const struct dpoint_cover *cover;
 	uint8_t *is_kept;
-	uint32_t *n_over, *sum, *alone, *lost;
+	struct over *over;
+	uint32_t *alone, *lost;
 	uint32_t *owner; /* kept ones that the one that is looked at may replace */
 	size_t n_owners;
 	uint64_t seed;
@@ -29,12 +34,12 @@ static void keep(struct swapping *s, uint32_t candidate)
 	s->alone[candidate] = 0;
 	for (uint32_t k = 0; k < s->cover->n[candidate]; k++)
 		for (uint32_t c = node_of(s, candidate, k)->begin, end = node_of(s, candidate, k)->end; c < end; c++) {
-			if (s->n_over[c] == 0)
+			if (s->over[c].n == 0)
 				s->alone[candidate]++;
-			else if (s->n_over[c] == 1)
-				s->alone[s->sum[c]]--;
-			s->n_over[c]++;
-			s->sum[c] += candidate;
+			else if (s->over[c].n == 1)
+				s->alone[s->over[c].sum]--;
+			s->over[c].n++;
+			s->over[c].sum += candidate;
 		}
 }
 
@@ -44,10 +49,10 @@ static void leave(struct swapping *s, uint32_t candidate)
 	s->is_kept[candidate] = 0;
 	for (uint32_t k = 0; k < s->cover->n[candidate]; k++)
 		for (uint32_t c = node_of(s, candidate, k)->begin, end = node_of(s, candidate, k)->end; c < end; c++) {
-			s->n_over[c]--;
-			s->sum[c] -= candidate;
-			if (s->n_over[c] == 1)
-				s->alone[s->sum[c]]++;
+			s->over[c].n--;
+			s->over[c].sum -= candidate;
+			if (s->over[c].n == 1)
+				s->alone[s->over[c].sum]++;
 		}
 }
 
@@ -59,8 +64,8 @@ static void find_owners(struct swapping *s, uint32_t candidate)
 	s->n_owners = 0;
 	for (uint32_t k = 0; k < s->cover->n[candidate]; k++)
 		for (uint32_t c = node_of(s, candidate, k)->begin, end = node_of(s, candidate, k)->end; c < end; c++)
-			if (s->n_over[c] == 1 && s->lost[s->sum[c]]++ == 0)
-				s->owner[s->n_owners++] = s->sum[c];
+			if (s->over[c].n == 1 && s->lost[s->over[c].sum]++ == 0)
+				s->owner[s->n_owners++] = s->over[c].sum;
 	for (size_t i = 0; i < s->n_owners; i++) {
 		const uint32_t owner = s->owner[i];
 
@@ -109,12 +114,11 @@ int choice_swap(struct dpoint_choice *choice, const struct dpoint_cover *cover)
 	struct swapping s = { cover, choice->is_kept, .seed = 1 };
 	int is_there;
 
-	s.n_over = calloc(cover->n_cells + 1, sizeof *s.n_over);
-	s.sum = calloc(cover->n_cells + 1, sizeof *s.sum);
+	s.over = calloc(cover->n_cells + 1, sizeof *s.over);
 	s.alone = calloc(n + 1, sizeof *s.alone);
 	s.lost = calloc(n + 1, sizeof *s.lost);
 	s.owner = malloc((n + 1) * sizeof *s.owner);
-	is_there = s.n_over != NULL && s.sum != NULL && s.alone != NULL && s.lost != NULL && s.owner != NULL;
+	is_there = s.over != NULL && s.alone != NULL && s.lost != NULL && s.owner != NULL;
 	if (is_there) {
 		size_t n_kept = 0, n_less;
 
@@ -128,8 +132,7 @@ int choice_swap(struct dpoint_choice *choice, const struct dpoint_cover *cover)
 			n_kept -= n_less;
 		} while (n_less > n_kept / LEAST_GAIN);
 	}
-	free(s.n_over);
-	free(s.sum);
+	free(s.over);
 	free(s.alone);
 	free(s.lost);
 	free(s.owner);
