@@ -101,14 +101,18 @@ static void look_at(struct search *s, const struct fitting *f, const struct rect
                     const struct dpoint_cell *cell, const struct sight *sight)
 {
 	const float radius = sight->radius;
-	float corner[4][3], above[4], middle[3] = { 0, 0, 0 }, off;
+	float corner[4][3], above[4], middle[3], off;
 	lanes seen[4];
 	struct bar bar;
 
+	memcpy(middle, &sight->p, sizeof middle);
+	if (rectangle_surely_suits(&f->look, r, cell, middle))
+		return;
 	for (int c = 0; c < 4; c++)
 		seen[c] = sight_turned(s->frame.axis, sight_place(cell->corner[c]) - s->frame.at);
 	if (is_beyond(seen, s) || v3f_dot(cell->normal, r->axis[2]) < -0.5f)
 		return;
+	v3f_set(middle, 0, 0, 0);
 	for (int c = 0; c < 4; c++) {
 		memcpy(corner[c], &seen[c], sizeof corner[c]);
 		v3f_add_scaled(middle, middle, 0.25f, corner[c]);

@@ -9,15 +9,30 @@
 /* Of a normal's angle: the derivative of asin is at most 1.6 up to here. */
 #define MOST_SINE 0.78f
 
+/* Of angles below 0.01, rounding would be too much of what is left. */
+static void find_sure(struct looking *l, float angle)
+{
+	const double most = fmin((double)angle, 1.5);
+	double s, c, w = 0.25;
+
+	while (0.18 * w * w * w > most / 16)
+		w *= 0.9;
+	psr_sincos(0.875 * most, &s, &c);
+	l->sure_sine2 = angle >= 0.01f ? (float)(w * w) : -1;
+	l->sure_cosine2 = (float)(c * c);
+}
+
 void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
                   const struct dpoint_cover_options *options)
 {
 	double s, c;
 
 	psr_sincos(fmin(options->angle, 3.14159), &s, &c);
-	*l = (struct looking){ surface, options, tree, c > 0 ? (float)c : 0, MOST_CHORD };
+	*l = (struct looking){ .surface = surface, .options = options, .tree = tree, .cosine = c > 0 ? (float)c : 0,
+	                       .chord = MOST_CHORD };
 	if (c > 0.82)
 		l->chord = (float)sqrt(2 - 2 * c);
+	find_sure(l, options->angle);
 }
 
 float cell_area(const struct dpoint_cell *cell)
@@ -122,7 +137,8 @@ int rectangle_suits_off(const struct looking *l, const struct rectangle *r, cons
 int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
                     const float at[3])
 {
-	return rectangle_suits_off(l, r, cell, at, fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])));
+	return rectangle_surely_suits(l, r, cell, at) ||
+	       rectangle_suits_off(l, r, cell, at, fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])));
 }
 
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell)

@@ -10,6 +10,7 @@ struct looking {
 	const struct dpoint_cover_options *options;
 	const struct cell_tree *tree;
 	float cosine, chord; /* of options->angle; chord: 2 sin(angle / 2), at most 0.6 */
+	float sure_sine2, sure_cosine2; /* rectangle_surely_suits() */
 };
 void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
                   const struct dpoint_cover_options *options);
@@ -55,6 +56,30 @@ int rectangle_suits(const struct looking *l, const struct rectangle *r, const st
 /* The same, where it is known how far from S_p the middle is. */
 int rectangle_suits_off(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
                         const float at[3], float off);
+
+/* Returns 1 only if rectangle_suits() does, by a bound that needs no root and no division; for cells of another look or
+ * part it is 0.
+ *
+ * With w the sine that [K] (5) takes the arc of, and |w| <= |lambda_u| r <= 1/4: the height of S_p is
+ * q / (1 + sqrt(1 - w^2)) with q = lambda_u (u^2 + rho v^2), and so within 0.14 |q| w^2 of q / 2. asin w / w is at most
+ * 1 + 0.172 w^2, so that the normal of [K] (6) is within 0.18 |w|^3 of (-lambda_u u, -lambda_v v, 1): that is a
+ * sixteenth of the angle at most, and an eighth is left. Places are off by 3e-7, which turns a normal by 3e-4 where
+ * lambda_u is 1000. */
+static inline int rectangle_surely_suits(const struct looking *l, const struct rectangle *r,
+                                         const struct dpoint_cell *cell, const float at[3])
+{
+	const float u2 = at[0] * at[0], v2 = at[1] * at[1], lambda_v = r->lambda_u * r->rho;
+	const float q = r->lambda_u * u2 + lambda_v * v2, w2 = r->lambda_u * r->lambda_u * (u2 + v2);
+	const float n[3] = { -r->lambda_u * at[0], -lambda_v * at[1], 1 };
+	float normal[3], dot;
+
+	if (!(w2 <= l->sure_sine2 && fabsf(at[2] - 0.5f * q) + 0.15f * fabsf(q) * w2 + 2e-6f <= r->height) ||
+	    cell->part == DPOINT_BEYOND || cell->attr != r->attr || fabsf(r->lambda_u) > 1000)
+		return 0;
+	m3f_apply(normal, (const float (*)[3])r->axis, cell->normal);
+	dot = v3f_dot(n, normal);
+	return dot > 0 && dot * dot >= l->sure_cosine2 * v3f_dot(n, n);
+}
 
 /* Whether all corners are within the extents, and the cell suits. */
 int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell);

@@ -38,11 +38,15 @@ static void what_is_behind_others_changes_nothing(void **state)
 		}
 		for (float u = -0.25f; u < 4.25f; u += 0.125f)
 			for (float v = -0.25f; v < 4.25f; v += 0.125f) {
-				int is_behind = 0;
+				const float extent[2] = { u, v };
+				int is_behind = 0, is_within = 0;
 
-				for (int i = 0; i < n; i++)
+				for (int i = 0; i < n; i++) {
 					is_behind |= is_nearer(&all[i], u, v);
+					is_within |= all[i].at[0] < u && all[i].at[1] < v;
+				}
 				assert_int_equal(bars_is_behind(&bars, u, v), is_behind);
+				assert_int_equal(bars_are_within(&bars, extent), is_within);
 			}
 		assert_int_equal(bars.is_failed, 0);
 		free(bars.bar);
