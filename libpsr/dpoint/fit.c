@@ -84,8 +84,8 @@ static inline int is_beyond(const lanes corner[4], const struct search *s)
 	return lanes_any(nearest + (lanes){ s->over[0], s->over[1], 0, 0 } >= s->sides);
 }
 
-/* Whether a step of growing before this one was around the cell, and had no bar of it, which is at its side: what a step
- * was around is not looked at again. */
+/* Whether a step of growing before this one was around the cell, and had no bar of it, which is at its side: what a
+ * step was around is not looked at again. */
 static int is_past(const struct search *s, const struct sight *sight, const struct bar *bar)
 {
 	for (int i = 0; i < s->n_steps; i++)
@@ -172,7 +172,8 @@ static inline struct below half_of(const struct below *node, int second)
 {
 	const uint32_t half = node->begin + (node->end - node->begin) / 2;
 
-	return second ? (struct below){ 2 * node->i + 2, half, node->end } : (struct below){ 2 * node->i + 1, node->begin, half };
+	return second ? (struct below){ 2 * node->i + 2, half, node->end }
+	              : (struct below){ 2 * node->i + 1, node->begin, half };
 }
 
 /* The node is not out. */
