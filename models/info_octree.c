@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include "base/maths.h"
 #include "model/cubes.h"
 #include "surface/material.h"
 
@@ -28,6 +29,30 @@ static void take_streams(struct stream streams[N_STREAMS], const struct octree *
 	streams[0].packed = 8.0 * (double)shares->codes / n;
 	for (int i = 0; i < OCTREE_STREAMS; i++)
 		streams[2 + i].packed = 8.0 * (double)shares->stream[i] / n;
+}
+
+/* Sets *degrees to how far normals lean from faces at most; returns in how many cells they do. */
+static int find_lean(double *degrees, const struct octree *tree)
+{
+	uint8_t most = 0;
+	int n = 0;
+
+	for (int i = 0; tree->lean != NULL && i < OCTREE_LEAN_CELLS; i++) {
+		n += tree->lean[i] > 0;
+		most = tree->lean[i] > most ? tree->lean[i] : most;
+	}
+	*degrees = asin(most / 255.0) / PSR_DEGREE;
+	return n;
+}
+
+static void print_lean(const struct octree *tree)
+{
+	double degrees;
+	const int n = find_lean(&degrees, tree);
+
+	if (n > 0)
+		printf("  %-14s  up to %.0f degrees from faces, in %d of %d cells\n", "normals lean", degrees, n,
+		       OCTREE_LEAN_CELLS);
 }
 
 static void print_material(uint32_t material)
@@ -57,6 +82,7 @@ void info_print_octree(const struct octree *tree, const struct octree_shares *sh
 	printf(shares->codes > 0 ? ", %.2f packed\n" : "\n", packed);
 	if (tree->one_material != NULL)
 		print_material(octree_material(tree, 0));
+	print_lean(tree);
 	info_print_scan(tree);
 }
 
@@ -64,11 +90,14 @@ cJSON *info_octree_json(const struct octree *tree, const struct octree_shares *s
 {
 	struct stream streams[N_STREAMS];
 	cJSON *root = cJSON_CreateObject(), *bits;
+	double degrees;
 
 	take_streams(streams, tree, shares);
 	cJSON_AddNumberToObject(root, "levels", tree->levels);
 	cJSON_AddNumberToObject(root, "leaves", (double)tree->n_leaves);
 	cJSON_AddNumberToObject(root, "codes", (double)tree->n_codes);
+	if (find_lean(&degrees, tree) > 0)
+		cJSON_AddNumberToObject(root, "lean_degrees", degrees);
 	info_add_scan(root, tree);
 	cJSON_AddNumberToObject(root, "leaf_edge", ldexp(tree->edge * scale, -tree->levels));
 	bits = cJSON_AddObjectToObject(root, "bits_per_leaf");

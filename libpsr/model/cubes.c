@@ -118,8 +118,8 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 {
 	struct psr_cubes *cubes = m->cubes;
 	const size_t n_cubes = cubes->groups.n_blocks, n_clusters = m->tree->n_skips * (uint64_t)m->n_levels;
-	const int has_cones = psr_octree_is_one_sided(m->tree);
-	size_t n = n_cubes * (sizeof *m->cube + sizeof *m->flags + (has_cones ? 4 : 0)) + n_clusters * sizeof *m->cluster;
+	const int has_cones = psr_octree_is_one_sided(m->tree), has_traits = has_cones && m->tree->lean != NULL;
+	size_t n = n_cubes * (sizeof *m->cube + sizeof *m->flags + (has_cones ? 4 : 0) + (has_traits ? 1 : 0)) + n_clusters * sizeof *m->cluster;
 	struct psr_cube_bound *bound;
 	struct psr_cube_run *run;
 	char *memory;
@@ -150,6 +150,8 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 			m->axis[a] = (int8_t *)m->flags + (size_t)(a + 1) * n_cubes;
 		m->sine = m->flags + 4 * n_cubes;
 	}
+	if (has_traits)
+		m->traits = m->flags + 5 * n_cubes;
 	cubes->groups.n_clusters = (uint32_t)n_clusters;
 	cubes->groups.cluster = m->cluster;
 	cubes->groups.flags = m->flags;
@@ -157,6 +159,7 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 	cubes->groups.cone_y = m->axis[1];
 	cubes->groups.cone_z = m->axis[2];
 	cubes->groups.cone_sine = m->sine;
+	cubes->groups.traits = m->traits;
 	return PSR_OK;
 }
 
@@ -232,7 +235,7 @@ uint64_t psr_cubes_guess(const struct octree *tree, unsigned leaf)
 	 * subtrees' roots the number is known. */
 	const double part = 1 / (1 + (double)tree->n_leaves / (double)tree->n_codes), n_skips = (double)tree->n_skips;
 	const double run = sizeof(struct psr_cube_run) + sizeof(struct psr_cube_bound);
-	const double bytes_cube = sizeof(struct psr_cube) + run / CUBES_RUN + 1 + (psr_octree_is_one_sided(tree) ? 4 : 0);
+	const double bytes_cube = sizeof(struct psr_cube) + run / CUBES_RUN + 1 + (psr_octree_is_one_sided(tree) ? 5 : 0);
 	double nodes = (double)tree->n_leaves, codes = (double)tree->n_codes, skips = n_skips, bytes = sizeof(struct psr_cubes);
 
 	for (int h = 1; h <= height; h++) {

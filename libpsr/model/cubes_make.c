@@ -149,8 +149,8 @@ static void average(const struct subtree *s, int level, uint64_t leaf, uint64_t 
 	}
 }
 
-/* Finds the cone of a cube's normals. */
-static void make_cone(const struct cubes_making *m, uint64_t cube, const uint16_t *normal, unsigned n)
+/* Finds the cone of a cube's normals, and of the faces that they may be of, from which they lean by this sine. */
+static void make_cone(const struct cubes_making *m, uint64_t cube, const uint16_t *normal, unsigned n, double lean)
 {
 	const float(*direction)[3] = psr_direction_table();
 	double sum[3] = { 0, 0, 0 }, axis[3], most = 0, length = 0, least = 1;
@@ -171,12 +171,26 @@ static void make_cone(const struct cubes_making *m, uint64_t cube, const uint16_
 
 		least = fmin(least, (axis[0] * (double)v[0] + axis[1] * (double)v[1] + axis[2] * (double)v[2]) / length);
 	}
+	if (lean > 0)
+		least = least * sqrt(1 - lean * lean) - sqrt(fmax(1 - least * least, 0)) * lean;
 	const double sine = ceil(sqrt(1 - least * least) * 255 + 1e-3);
 	m->sine[cube] = (uint8_t)(least >= LEAST_COSINE && sine < PSR_CONE_ANY ? sine : PSR_CONE_ANY);
 }
 
+/* How far leaves of subtree i lean. */
+static uint8_t lean_of(const struct octree *tree, uint64_t i)
+{
+	const int depth = tree->levels - octree_subtree_height(tree), below = OCTREE_LEAN_DEPTH - depth;
+	const uint64_t first = octree_lean_first(tree->skip[i].path, depth), n = below > 0 ? UINT64_C(1) << 3 * below : 1;
+	uint8_t most = 0;
+
+	for (uint64_t k = first; tree->lean != NULL && k < first + n; k++)
+		most = tree->lean[k] > most ? tree->lean[k] : most;
+	return most;
+}
+
 /* The cubes of a level from `cube` to the next one, whose leaves begin with `leaf`. */
-static void make_cones(const struct subtree *s, int level, uint64_t cube, uint64_t leaf)
+static void make_cones(const struct subtree *s, int level, uint64_t cube, uint64_t leaf, uint8_t lean)
 {
 	const struct cubes_making *m = s->m;
 	const struct psr_cube_level *of = &m->cubes->level[level];
@@ -186,7 +200,9 @@ static void make_cones(const struct subtree *s, int level, uint64_t cube, uint64
 		const uint16_t next = cube + 1 < end ? m->cube[cube + 1].leaf : (uint16_t)s->next.leaf[level];
 		const unsigned n = (uint16_t)(next - m->cube[cube].leaf);
 
-		make_cone(m, cube, of->tree->normal + leaf, n);
+		make_cone(m, cube, of->tree->normal + leaf, n, lean / 255.0);
+		if (m->traits != NULL)
+			m->traits[cube] = lean > 0 ? PSR_BLOCK_BENT : 0;
 		leaf += n;
 	}
 }
@@ -262,6 +278,7 @@ static void put_above(struct subtree *s, uint64_t i)
 static void put_subtree(struct subtree *s, uint64_t i)
 {
 	const struct cubes_making *m = s->m;
+	const uint8_t lean = lean_of(m->tree, i);
 	struct cubes_count first;
 	uint32_t at[3];
 	uint8_t root;
@@ -276,7 +293,7 @@ static void put_subtree(struct subtree *s, uint64_t i)
 		if (l > 0)
 			average(s, l, first.leaf[l], first.leaf[l - 1]);
 		if (m->sine != NULL)
-			make_cones(s, l, first.cube[l], first.leaf[l]);
+			make_cones(s, l, first.cube[l], first.leaf[l], lean);
 		make_cluster(s, l, i, first.cube[l]);
 	}
 	if (m->tree->is_cloud)

@@ -23,6 +23,7 @@ struct cubes_making {
 	struct psr_cube_run *run[CUBES_MOST_LEVELS];
 	struct psr_cube_bound *bound[CUBES_MOST_LEVELS];
 	uint8_t *flags, *sine;     /* sine, axis: NULL without cones */
+	uint8_t *traits;           /* NULL: no leaf leans */
 	int8_t *axis[3];
 };
 

@@ -68,6 +68,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_CALIBRATION_FINE] = { "CALF", 1, 0, COUNT_CALIBRATED, CALIBRATED_FINE_BYTES,
 	                               offsetof(struct content, calibration) + offsetof(struct psr_calibration, fine) },
 	[SECTION_ONE_MATERIAL] = TREE("OMT1", COUNT_ONE, 3, one_material),
+	[SECTION_LEAN] = TREE("OLEN", COUNT_LEAN, 1, lean),
 	[SECTION_DELTAS] = SET("DDLT", COUNT_DELTAS, 2, delta),
 };
 
@@ -105,6 +106,8 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 	case COUNT_POINTS:
 	case COUNT_DELTAS:
 		return content->points.n_points;
+	case COUNT_LEAN:
+		return OCTREE_LEAN_CELLS;
 	case COUNT_ONE:
 		break;
 	}
@@ -292,6 +295,8 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 /* The first version that knows all sections. */
 static unsigned minor_of(const struct content *content)
 {
+	if (is_present(SECTION_LEAN, content))
+		return FILE_MINOR_LEAN;
 	if (content->blocks.n_blocks != 0 && !(content->blocks.traits_of_all & PSR_BLOCK_OLD))
 		return FILE_MINOR_OFF;
 	if (is_present(SECTION_DELTAS, content))

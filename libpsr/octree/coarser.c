@@ -50,6 +50,11 @@ static int make_attributes(struct octree *tree, const struct octree *finer)
 			return 0;
 		memcpy(tree->one_material, finer->one_material, sizeof *tree->one_material);
 	}
+	if (finer->lean != NULL) {
+		if ((tree->lean = malloc(OCTREE_LEAN_CELLS)) == NULL)
+			return 0;
+		memcpy(tree->lean, finer->lean, OCTREE_LEAN_CELLS);
+	}
 	octree_walk(finer, tree->levels, put_means, &averaging);
 	return 1;
 }

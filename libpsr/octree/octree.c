@@ -13,6 +13,7 @@ void octree_destroy(struct octree *tree)
 	free(tree->color);
 	free(tree->offset);
 	free(tree->material);
+	free(tree->lean);
 	free(tree->one_material);
 	free(tree->scan.intensity);
 	free(tree->scan.class);

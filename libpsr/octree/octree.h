@@ -30,6 +30,9 @@ struct octree_scan {
 	double (*time_scale)[2]; /* the time of 0, and seconds of a step; not NULL where `time` is not */
 };
 
+#define OCTREE_LEAN_DEPTH 4
+#define OCTREE_LEAN_CELLS 4096
+
 struct octree {
 	int levels;
 	int is_one_sided;          /* 1: normals point out of a solid, and leaves are not seen from their backs */
@@ -43,6 +46,9 @@ struct octree {
 	uint8_t (*color)[3];       /* sRGB; NULL: none */
 	uint8_t *offset;           /* [B] 5.1: 0..OCTREE_OFFSETS - 1, octree_offset(); NULL: none */
 	uint8_t (*material)[3];    /* of each leaf: bits 40 to 63 of a sample's attributes (model/blocks.h), lowest byte first */
+	uint8_t *lean;             /* of one-sided trees, by path of the OCTREE_LEAN_CELLS nodes of depth OCTREE_LEAN_DEPTH, 255
+	                            * times a sine: so far normals of leaves lean from the faces that they are of, which
+	                            * then cannot be told by them. NULL: all 0 */
 	uint8_t (*one_material)[3]; /* of all leaves, where that is NULL; both NULL: OCTREE_MATTE */
 	struct octree_scan scan;
 };
@@ -161,6 +167,12 @@ static inline uint32_t octree_gather(uint64_t v)
 static inline uint64_t octree_path(const uint32_t at[3])
 {
 	return octree_spread(at[0]) | octree_spread(at[1]) << 1 | octree_spread(at[2]) << 2;
+}
+
+/* Returns the first node of depth OCTREE_LEAN_DEPTH that is the one of this path and depth, above it, or below it. */
+static inline uint64_t octree_lean_first(uint64_t path, int depth)
+{
+	return depth > OCTREE_LEAN_DEPTH ? path >> 3 * (depth - OCTREE_LEAN_DEPTH) : path << 3 * (OCTREE_LEAN_DEPTH - depth);
 }
 
 static inline void octree_place(uint64_t path, uint32_t at[3])

@@ -227,3 +227,26 @@ def find(o):
             r = find(v)
             if r: return r
 print(*find(json.load(open(sys.argv[1]))))' "$work/report.json")"
+
+# A prism whose normals lean from its faces by 15 degrees, and whose ends are sides of the octree's cube; and without ends.
+prism() { # faces of ends, 0 or 1
+	awk -v ends="$1" 'BEGIN { pi = atan2(0, -1); n = 12; print "OFF"; print 2 * n + 2, 2 * n + 2 * n * ends, 0
+		for (i = 0; i < n; i++) for (z = -1; z <= 1; z += 2) print cos(2 * pi * i / n), sin(2 * pi * i / n), z
+		print 0, 0, -1; print 0, 0, 1
+		for (i = 0; i < n; i++) { a = 2 * i; b = 2 * ((i + 1) % n); print 3, a, b, b + 1; print 3, a, b + 1, a + 1
+			if (ends) { print 3, b, a, 2 * n; print 3, a + 1, b + 1, 2 * n + 1 } } }'
+}
+for ends in 1 0; do
+	prism $ends >"$work/prism.off"
+	psr-model build "$work/prism.off" --representation octree -r 512 -q -o "$work/prism.psr"
+	psr-model build "$work/prism.off" --representation octree -r 512 --pack -q -o "$work/packed.psr"
+	is "a prism packed is the same: ends $ends" "$(psr-model info "$work/prism.psr" | grep 'content id')" \
+		"$(psr-model info "$work/packed.psr" | grep 'content id')"
+	for view in "2 3" "33 20" "64 -5" "91 89" "151 0.5"; do
+		read -r azimuth elevation <<<"$view"
+		psr shot "$work/prism.psr" --size 400x400 --no-smooth --codec lossless --ambient 1 --azimuth "$azimuth" \
+			--elevation "$elevation" -o "$work/prism.ppm" --depth "$work/prism.pfm" --report "$work/prism.json" 2>/dev/null
+		check "its picture has no hole: ends $ends, $view" psr-model accuracy "$work/prism.off" --depth "$work/prism.pfm" \
+			--report "$work/prism.json" --max-holes 0
+	done
+done

@@ -13,12 +13,12 @@ struct meeting {
 	struct psr_error *err;
 };
 
-/* Returns whether the triangle's shadow on an axis and the cube's are apart. `half`: the cube's edge, halved. */
-static int is_apart(const struct meeting *m, const double axis[3], const double middle[3], double half)
+/* Returns whether the triangle's shadow on an axis and the cube's are apart. Corners count from the cube's middle, so that
+ * a triangle on one of its faces is met however large the axis is. `half`: the cube's edge, halved. */
+static int is_apart(const double corner[3][3], const double axis[3], double half)
 {
-	const double reach = half * (fabs(axis[0]) + fabs(axis[1]) + fabs(axis[2])), at = v3d_dot(axis, middle);
-	const double a = v3d_dot(axis, m->corner[0]) - at, b = v3d_dot(axis, m->corner[1]) - at;
-	const double c = v3d_dot(axis, m->corner[2]) - at;
+	const double reach = half * (fabs(axis[0]) + fabs(axis[1]) + fabs(axis[2]));
+	const double a = v3d_dot(axis, corner[0]), b = v3d_dot(axis, corner[1]), c = v3d_dot(axis, corner[2]);
 
 	return fmin(a, fmin(b, c)) > reach || fmax(a, fmax(b, c)) < -reach;
 }
@@ -27,14 +27,18 @@ static int is_apart(const struct meeting *m, const double axis[3], const double 
  * the bounds. */
 static int meets(const struct meeting *m, const double middle[3], double half)
 {
-	if (is_apart(m, m->normal, middle, half))
+	double corner[3][3];
+
+	for (int i = 0; i < 3; i++)
+		v3d_sub(corner[i], m->corner[i], middle);
+	if (is_apart(corner, m->normal, half))
 		return 0;
 	for (int i = 0; i < 3; i++) {
 		const double *s = m->side[i];
 
-		if (is_apart(m, (const double[3]){ 0.0, s[2], -s[1] }, middle, half) ||
-		    is_apart(m, (const double[3]){ -s[2], 0.0, s[0] }, middle, half) ||
-		    is_apart(m, (const double[3]){ s[1], -s[0], 0.0 }, middle, half))
+		if (is_apart(corner, (const double[3]){ 0.0, s[2], -s[1] }, half) ||
+		    is_apart(corner, (const double[3]){ -s[2], 0.0, s[0] }, half) ||
+		    is_apart(corner, (const double[3]){ s[1], -s[0], 0.0 }, half))
 			return 0;
 	}
 	return 1;
@@ -65,13 +69,12 @@ static int put_leaves(struct meeting *m, const uint32_t at[3], int up)
 static int put_triangle(struct meeting *m, const struct octree_surface *s, const uint32_t triangle[3])
 {
 	const int most = (1 << m->levels) - 1;
-	const double scale = ldexp(1.0, m->levels) / s->edge;
 	uint32_t at[3];
 	int up = 0;
 
 	for (int i = 0; i < 3; i++)
 		for (int c = 0; c < 3; c++)
-			m->corner[i][c] = (s->position[triangle[i]][c] - s->low[c]) * scale;
+			m->corner[i][c] = octree_surface_place(s, triangle[i], c, m->levels);
 	for (int i = 0; i < 3; i++)
 		v3d_sub(m->side[i], m->corner[(i + 1) % 3], m->corner[i]);
 	v3d_cross(m->normal, m->side[0], m->side[1]);

@@ -2,6 +2,7 @@
 #ifndef PSR_OCTREE_BUILD_VOXELS_H
 #define PSR_OCTREE_BUILD_VOXELS_H
 
+#include <math.h>
 #include <stddef.h>
 #include "octree/octree.h"
 #include "base/pool.h"
@@ -13,6 +14,14 @@ struct octree_surface {
 	double low[3], edge;          /* a cube that holds all positions; edge > 0 */
 	const struct psr_cancel *cancel; /* may be NULL */
 };
+
+/* Finds where a vertex is along an axis, in leaves of trees of so many levels: within the cube, however places round. */
+static inline double octree_surface_place(const struct octree_surface *surface, uint32_t vertex, int axis, int levels)
+{
+	const double most = ldexp(1.0, levels), at = (surface->position[vertex][axis] - surface->low[axis]) * (most / surface->edge);
+
+	return at < 0.0 ? 0.0 : at > most ? most : at;
+}
 
 /* Builds a tree without attributes: a leaf for each closed cell that a triangle meets. Sorts in `memory` bytes, in runs
  * in `folder`. ARG: levels out of range; IO, MEMORY, CANCELLED. */

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include "of_mesh.h"
 #include "facet.h"
+#include "lean.h"
 #include "octree/build/voxels.h"
 #include "surface/material.h"
 #include "surface/surface.h"
@@ -26,11 +27,11 @@ struct leaf_maker {
 	struct surface look;
 	uint8_t *is_turned;
 	int levels;
-	double scale;              /* leaves a unit of the mesh */
 	struct octree_maker maker;
 	uint64_t room;
 	struct facet *facet;       /* of the leaf that is made */
 	size_t n_facets, facets_room;
+	struct lean lean;
 	struct octree_mesh_report report;
 };
 
@@ -108,7 +109,7 @@ static int find_facets(struct leaf_maker *m, const uint32_t at[3], const uint32_
 		for (int k = 0; k < 3; k++)
 			for (int c = 0; c < 3; c++)
 				facet->corner[k][c] =
-					(m->mesh->position[m->mesh->triangle[triangle[i]][k]][c] - m->surface.low[c]) * m->scale - at[c];
+					octree_surface_place(&m->surface, m->mesh->triangle[triangle[i]][k], c, m->levels) - at[c];
 		clip_triangle(&clip, (const double(*)[3])facet->corner);
 		if (clip.n == 0 || clip_is_next_ones(&clip, is_last))
 			continue;
@@ -205,10 +206,11 @@ static double find_offset(const struct leaf_maker *m, const float normal[3], con
 }
 
 /* Sets a leaf's normal, and where its point is along it. */
-static void set_plane(const struct leaf_maker *m, uint64_t leaf)
+static void set_plane(struct leaf_maker *m, uint64_t path, uint64_t leaf)
 {
 	struct octree *tree = m->maker.tree;
 	double area = 0.0, normal[3] = { 0 }, middle[3] = { 0 };
+	const float *own;
 	float mean[3];
 
 	for (size_t i = 0; i < m->n_facets; i++) {
@@ -225,12 +227,13 @@ static void set_plane(const struct leaf_maker *m, uint64_t leaf)
 		middle[c] /= area;
 	}
 	tree->normal[leaf] = psr_direction_encode(mean);
-	tree->offset[leaf] =
-		(uint8_t)octree_offset_step(find_offset(m, psr_direction_table()[tree->normal[leaf]], middle));
+	own = psr_direction_table()[tree->normal[leaf]];
+	tree->offset[leaf] = (uint8_t)octree_offset_step(find_offset(m, own, middle));
+	lean_add(&m->lean, path, own, m->facet, m->n_facets);
 }
 
 /* The mean normal of two faces is nearest to both of them, but a mirror with it shows what neither of them does. */
-static void set_leaf(struct leaf_maker *m, uint64_t leaf)
+static void set_leaf(struct leaf_maker *m, uint64_t path, uint64_t leaf)
 {
 	struct octree *tree = m->maker.tree;
 	struct look_sums sums = { 0 };
@@ -244,7 +247,7 @@ static void set_leaf(struct leaf_maker *m, uint64_t leaf)
 	if (shines(&sums))
 		for (int face = 1; face < FACES && facets_keep_face(m->facet, &m->n_facets); face++)
 			;
-	set_plane(m, leaf);
+	set_plane(m, path, leaf);
 }
 
 static int leaf_room(struct leaf_maker *m, uint64_t leaf)
@@ -286,7 +289,7 @@ static int make_leaf(uint64_t path, const uint32_t *triangle, size_t n, void *us
 	}
 	if (m->n_facets == 0)
 		return PSR_OK;
-	set_leaf(m, leaf);
+	set_leaf(m, path, leaf);
 	return octree_maker_put(&m->maker, path, m->err);
 }
 
@@ -335,11 +338,13 @@ static int build(struct leaf_maker *m)
 	const struct octree_room room = { m->options->memory, m->options->folder };
 	int rc = octree_mesh_sides(&m->is_turned, &m->report.is_closed, m->mesh);
 
+	m->lean = (struct lean){ m->mesh, m->is_turned, m->levels, calloc(OCTREE_LEAN_CELLS, sizeof *m->lean.cell) };
+	if (rc == PSR_OK && m->lean.cell == NULL)
+		rc = PSR_ERR_MEMORY;
 	if (rc == PSR_OK)
 		rc = surface_init(&m->look, m->mesh, ldexp(m->surface.edge, -m->levels));
 	if (rc != PSR_OK)
 		return psr_fail(m->err, rc, "no memory for a surface of %u triangles", m->mesh->n_triangles);
-	m->scale = ldexp(1.0, m->levels) / m->surface.edge;
 	rc = octree_maker_init(&m->maker, m->levels, m->err);
 	if (rc == PSR_OK)
 		rc = octree_surface_walk(&m->surface, m->levels, &room, make_leaf, m, m->err);
@@ -375,9 +380,14 @@ int octree_of_mesh(struct octree **out, struct octree_mesh_report *report, const
 		(*out)->is_one_sided = m.report.is_closed && m.report.n_both * SIDES <= (*out)->n_leaves;
 		if (report != NULL)
 			*report = m.report;
+		if ((*out)->is_one_sided && !lean_set(*out, &m.lean)) { /* one of both sides has no need of it */
+			octree_destroy(*out);
+			rc = psr_fail(m.err, PSR_ERR_MEMORY, "no memory for an octree");
+		}
 	}
 	octree_maker_fini(&m.maker);
 	surface_fini(&m.look);
+	free(m.lean.cell);
 	free(m.is_turned);
 	free(m.facet);
 	return rc;

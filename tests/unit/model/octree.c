@@ -42,6 +42,9 @@ static int setup(void **state)
 	tree->scan.time_scale = malloc(sizeof *tree->scan.time_scale);
 	(*tree->scan.time_scale)[0] = 3e8;
 	(*tree->scan.time_scale)[1] = 1e-5;
+	tree->lean = malloc(OCTREE_LEAN_CELLS);
+	for (int i = 0; i < OCTREE_LEAN_CELLS; i++)
+		tree->lean[i] = (uint8_t)fixture_random(&random);
 	for (uint64_t i = 0; i < tree->n_leaves; i++) {
 		tree->normal[i] = (uint16_t)(fixture_random(&random) & 0x7fff);
 		tree->offset[i] = (uint8_t)(fixture_random(&random) % OCTREE_OFFSETS);
@@ -80,6 +83,7 @@ static void assert_tree(const struct octree *t)
 	assert_memory_equal(t->skip, tree->skip, tree->n_skips * sizeof *tree->skip);
 	assert_memory_equal(t->normal, tree->normal, tree->n_leaves * sizeof *tree->normal);
 	assert_memory_equal(t->offset, tree->offset, tree->n_leaves);
+	assert_memory_equal(t->lean, tree->lean, OCTREE_LEAN_CELLS);
 	assert_memory_equal(t->color, tree->color, tree->n_leaves * sizeof *tree->color);
 	assert_memory_equal(t->material, tree->material, tree->n_leaves * sizeof *tree->material);
 	assert_memory_equal(t->scan.intensity, tree->scan.intensity, tree->n_leaves * sizeof *tree->scan.intensity);
@@ -205,6 +209,7 @@ static void one_material_of_all_leaves_is_there_once(void **state)
 	(void)state;
 	octree_put_material(material[0], 0x1234bf);
 	t.material = NULL;
+	t.lean = NULL;
 	t.scan = (struct octree_scan){ NULL };
 	assert_int_equal(psr_model_create_octree(&bare, &fixture.info, &t, NULL, NULL), PSR_OK);
 	t.one_material = material;
@@ -356,7 +361,7 @@ static void sections_of_octrees_are_not_required(void **state)
 			assert_int_equal(file_get(entry + ENTRY_FLAGS, 2), 0);
 	}
 	assert_int_equal(file_get(copy + HEADER_MAJOR, 2), 6);
-	assert_int_equal(file_get(copy + HEADER_MINOR, 2), 6);
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), FILE_MINOR_LEAN);
 	free(copy);
 }
 

@@ -175,6 +175,124 @@ static void a_surface_between_leaves_belongs_to_one_layer(void **state)
 	meshes_free(mesh);
 }
 
+/* Areas of a tube's sides sum up to nothing, as those of a solid do. Its seam is closed but for the rounding of a sine. */
+static void a_tube_without_ends_is_seen_from_both_sides(void **state)
+{
+	struct psr_mesh *mesh = meshes_grid(12, 1);
+	struct octree *tree;
+
+	(void)state;
+	for (uint32_t v = 0; v < mesh->n_vertices; v++) {
+		const double a = 2 * 3.14159265358979323846 * (v / 2) / 12;
+
+		v3d_set(mesh->position[v], cos(a), sin(a), v % 2);
+		for (int c = 0; c < 3; c++)
+			mesh->normal[v][c] = c < 2 ? (float)mesh->position[v][c] : 0;
+	}
+	tree = tree_of(mesh);
+	assert_false(report.is_closed || tree->is_one_sided);
+	octree_destroy(tree);
+	meshes_free(mesh);
+}
+
+#define GRID 13u /* quads a side of a face: their corners are on no side of a leaf */
+
+/* A box whose faces are of many triangles, from 0 to `high`; normals point out of the sphere around it if is_round. */
+static struct psr_mesh *make_fine_box(const double high[3], int is_round)
+{
+	struct psr_mesh *mesh = meshes_new(6 * (GRID + 1) * (GRID + 1), 12 * GRID * GRID);
+	uint32_t v = 0, t = 0;
+
+	for (unsigned face = 0; face < 6; face++) {
+		const unsigned axis = face / 2, is_high = face % 2;
+		const uint32_t first = v;
+
+		for (uint32_t i = 0; i <= GRID; i++)
+			for (uint32_t j = 0; j <= GRID; j++, v++) {
+				double n[3];
+
+				mesh->position[v][axis] = is_high ? high[axis] : 0;
+				mesh->position[v][(axis + 1) % 3] = i == GRID ? high[(axis + 1) % 3] : high[(axis + 1) % 3] * i / GRID;
+				mesh->position[v][(axis + 2) % 3] = j == GRID ? high[(axis + 2) % 3] : high[(axis + 2) % 3] * j / GRID;
+				v3d_set(n, 0, 0, 0);
+				n[axis] = is_high ? 1 : -1;
+				for (int c = 0; is_round && c < 3; c++)
+					n[c] = mesh->position[v][c] - high[c] / 2;
+				v3d_normalize(n, n);
+				for (int c = 0; c < 3; c++)
+					mesh->normal[v][c] = (float)n[c];
+			}
+		for (uint32_t i = 0; i < GRID; i++)
+			for (uint32_t j = 0; j < GRID; j++)
+				for (unsigned half = 0; half < 2; half++, t++) {
+					const uint32_t at = first + i * (GRID + 1) + j, across = at + GRID + 2;
+					const uint32_t side = half ? at + 1 : at + GRID + 1;
+					const int is_out = (half == 0) == (is_high == 1);
+
+					mesh->triangle[t][0] = at;
+					mesh->triangle[t][1] = is_out ? side : across;
+					mesh->triangle[t][2] = is_out ? across : side;
+				}
+	}
+	return mesh;
+}
+
+/* Rounding leaves out no triangle that lies on sides of leaves, and no place beyond the cube's own. */
+static void fine_faces_between_leaves_are_whole(void **state)
+{
+	static const double sizes[] = { 1.0, 0.3, 0.7, 7.1, 1e-3, 1234.567, 1.0 / 3, 1e5 / 7 };
+
+	(void)state;
+	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+		for (int is_half = 0; is_half < 2; is_half++) {
+			const double s = sizes[i];
+			struct psr_mesh *mesh = make_fine_box((const double[3]){ s, is_half ? s / 2 : s, s }, 0);
+			struct octree *tree = tree_of(mesh);
+			const uint64_t around = 4 * (SIDE - 1), n_layers = is_half ? SIDE / 2 - 1 : SIDE - 2;
+
+			assert_int_equal(tree->n_leaves, 2 * SIDE * SIDE + n_layers * around);
+			assert_true(tree->is_one_sided && tree->lean == NULL);
+			octree_destroy(tree);
+			meshes_free(mesh);
+		}
+}
+
+/* Normals out of a sphere lean from a box's faces: in their middles not at all, at its edges by up to 45, at its corners
+ * by 54.7 degrees. Cells of depth 4 are an eighth of a face from its middle to its edge. Nobody's leaves tell of a face
+ * whose triangles are narrower than gaps that are filled in. */
+static void normals_that_lean_from_wide_faces_are_told(void **state)
+{
+	struct psr_mesh *mesh = make_fine_box((const double[3]){ 1, 1, 1 }, 1);
+	struct octree *tree = NULL;
+	struct psr_error err;
+	unsigned n = 0;
+	double most = 0;
+
+	(void)state;
+	assert_int_equal(try_tree(&tree, mesh, 9, &err), PSR_OK);
+	assert_non_null(tree->lean);
+	for (uint32_t k = 0; k < OCTREE_LEAN_CELLS; k++) {
+		const double sine = tree->lean[k] / 255.0;
+		uint32_t at[3];
+		int is_inside = 1;
+
+		octree_place(k, at);
+		for (int c = 0; c < 3; c++)
+			is_inside &= at[c] > 0 && at[c] < 15;
+		assert_true(!is_inside || sine == 0);
+		n += sine > 0;
+		most = fmax(most, sine);
+	}
+	print_message("%u cells lean, up to %.1f degrees\n", n, asin(most) * DEGREES);
+	assert_true(n > 600); /* of the shell's 1352 */
+	assert_true(fabs(asin(most) * DEGREES - 54.7) < 54.7 * 0.05);
+	octree_destroy(tree);
+	assert_int_equal(try_tree(&tree, mesh, 4, &err), PSR_OK);
+	assert_null(tree->lean);
+	octree_destroy(tree);
+	meshes_free(mesh);
+}
+
 /* ---- colours ---- */
 
 static void look_at_halves(const struct point *p, void *userdata)
@@ -501,6 +619,9 @@ int main(void)
 		cmocka_unit_test(points_of_a_sphere_are_on_it_and_look_out),
 		cmocka_unit_test(points_of_a_box_are_on_its_sides),
 		cmocka_unit_test(a_surface_between_leaves_belongs_to_one_layer),
+		cmocka_unit_test(a_tube_without_ends_is_seen_from_both_sides),
+		cmocka_unit_test(fine_faces_between_leaves_are_whole),
+		cmocka_unit_test(normals_that_lean_from_wide_faces_are_told),
 		cmocka_unit_test(textures_come_through),
 		cmocka_unit_test(textures_finer_than_leaves_are_filtered),
 		cmocka_unit_test(colors_of_vertices_are_those_of_the_middle),
