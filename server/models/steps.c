@@ -58,18 +58,19 @@ static int is_lost(int code)
 	return code == PSR_ERR_FORMAT || code == PSR_ERR_VERSION || code == PSR_ERR_NOT_FOUND;
 }
 
-static void log_loaded(const struct opening *o, const struct catalogue_model *model)
+static void log_loaded(const struct opening *o)
 {
+	const double megabytes = (double)psr_model_bytes(o->model) * 1e-6;
 	struct psr_model_prefix prefix;
 
-	if (psr_model_is_prefix(model->model, &prefix) && prefix.levels == prefix.of_levels)
+	if (psr_model_is_prefix(o->model, &prefix) && prefix.levels == prefix.of_levels)
 		log_info("model %s: loaded, all %u levels of its octree without its scan, %.1f MB", o->file.name, prefix.levels,
-		         (double)model->bytes * 1e-6);
+		         megabytes);
 	else if (prefix.levels > 0)
 		log_info("model %s: loaded, %u of the %u levels of its octree, %.1f MB", o->file.name, prefix.levels,
-		         prefix.of_levels, (double)model->bytes * 1e-6);
+		         prefix.of_levels, megabytes);
 	else
-		log_info("model %s: loaded, %.1f MB", o->file.name, (double)model->bytes * 1e-6);
+		log_info("model %s: loaded, %.1f MB", o->file.name, megabytes);
 }
 
 static void on_loaded(void *userdata)
@@ -82,6 +83,8 @@ static void on_loaded(void *userdata)
 
 	o->has_job = o->is_loading = 0;
 	o->reserved = 0;
+	if (o->code == PSR_OK)
+		log_loaded(o);
 	o->model = NULL;
 	if (o->code == PSR_ERR_CANCELLED && o->waiters != NULL && !o->opener->is_stopped) {
 		catalogue_release(catalogue, loaded.reserved);
@@ -105,7 +108,7 @@ static void on_loaded(void *userdata)
 		fail(o, PSR_ERR_MEMORY, "no memory to open a model");
 		return;
 	}
-	log_loaded(o, added);
+	/* It may have left memory again by now, for another opening that waited for its room. */
 	opener_end(o, added, NULL);
 	catalogue_unref(catalogue, added);
 }

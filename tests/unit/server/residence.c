@@ -69,7 +69,7 @@ static int tear_down(void **state)
 	return 0;
 }
 
-static void start(void)
+static void start_with(long bytes)
 {
 	char program[PATH_MAX + 16], cache[PATH_MAX + 16], memory[32];
 	const char *argv[] = { program, "--listen", "127.0.0.1:0", "--models", folder, "--cache", cache, "--threads", "2",
@@ -77,9 +77,14 @@ static void start(void)
 
 	snprintf(program, sizeof program, "%s/psrd", bin);
 	snprintf(cache, sizeof cache, "%s/cache", bin);
-	snprintf(memory, sizeof memory, "%d", MEMORY);
+	snprintf(memory, sizeof memory, "%ld", bytes);
 	daemon_spawn(&psrd, argv);
 	daemon_wait_ready(&psrd);
+}
+
+static void start(void)
+{
+	start_with(MEMORY);
 }
 
 static uint32_t open_model(struct peer *peer, const char *name)
@@ -216,6 +221,32 @@ static void models_that_never_fit_together_are_refused_with_the_figures(void **s
 	assert_non_null(strstr(text, "--max-memory"));
 	draw(&p, handle_p, 0, 1);
 	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+/* Of many that are opened at once, and do not fit together, some leave while they come: others wait for their room. */
+static void a_model_may_leave_as_it_comes(void **state)
+{
+	(void)state;
+	start_with(1 << 20);
+	peer_hello(&p, &psrd, NULL);
+	peer_hello(&q, &psrd, NULL);
+	for (int i = 0; i < N; i++) {
+		char name[32];
+
+		model_name(name, i);
+		peer_ask_open(i % 2 ? &q : &p, name);
+	}
+	for (int i = 0; i < N; i++) { /* in any order */
+		struct psr_message message;
+
+		do
+			assert_true(peer_next(i % 2 ? &q : &p, &message));
+		while (message.type == PSR_MSG_PROGRESS);
+		assert_int_equal(message.type, PSR_MSG_OPENED);
+	}
+	peer_close(&p);
+	peer_close(&q);
 	daemon_stop(&psrd);
 }
 
@@ -404,6 +435,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(models_leave_memory_and_come_back_the_same, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(crowds_that_exclude_each_other_are_all_drawn, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(models_that_never_fit_together_are_refused_with_the_figures, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_model_may_leave_as_it_comes, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_name_keeps_its_numbers_and_presets_without_its_model, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_has_gone_or_changed_is_not_found, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_built_model_comes_back_from_the_cache_or_is_built_again, set_up, tear_down),
