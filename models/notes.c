@@ -2,7 +2,9 @@
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include "model/blocks.h"
+#include "surface/normal.h"
 
 #define PROGRAM "psr-model build"
 #define NOTE PROGRAM ": note: "
@@ -47,22 +49,30 @@ static int is_sheer(const struct psr_mesh *mesh, const struct psr_material *mate
 	       && (mesh->color != NULL || material->base_color[3] < 1 || (image >= 0 && !image_is_opaque(&mesh->image[image])));
 }
 
-static uint32_t count_triangles(const struct psr_mesh *mesh, uint32_t material)
+static int is_mapped(const struct psr_mesh *mesh, const struct psr_material *material)
 {
-	uint32_t n = 0;
+	(void)mesh;
+	return normal_is_mapped(material);
+}
 
-	for (uint32_t t = 0; t < mesh->n_triangles; t++)
-		n += mesh->triangle_material[t] == material;
+/* Counts the triangles of such materials; 0 without memory: it is but a note. */
+static uint32_t count_triangles(const struct psr_mesh *mesh,
+                                int (*is_such)(const struct psr_mesh *mesh, const struct psr_material *material))
+{
+	uint32_t *of = calloc(mesh->n_materials, sizeof *of), n = 0;
+
+	for (uint32_t t = 0; of != NULL && t < mesh->n_triangles; t++)
+		of[mesh->triangle_material[t]]++;
+	for (uint32_t m = 0; of != NULL && m < mesh->n_materials; m++)
+		n += of[m] > 0 && is_such(mesh, &mesh->material[m]) ? of[m] : 0;
+	free(of);
 	return n;
 }
 
 static void note_sheer(const struct psr_mesh *mesh, const char *kind)
 {
-	uint32_t n = 0;
+	const uint32_t n = count_triangles(mesh, is_sheer);
 
-	for (uint32_t m = 0; m < mesh->n_materials; m++)
-		if (is_sheer(mesh, &mesh->material[m]))
-			n += count_triangles(mesh, m);
 	if (n > 0)
 		fprintf(stderr, NOTE "%" PRIu32 " of %" PRIu32 " triangles are of surfaces that let light through (BLEND materials);"
 		        " %s are opaque, see through them with --representation blocks\n", n, mesh->n_triangles, kind);
@@ -75,12 +85,9 @@ void notes_of_octree(const struct psr_mesh *mesh)
 
 void notes_of_points(const struct psr_mesh *mesh)
 {
-	uint32_t n = 0;
+	const uint32_t n = count_triangles(mesh, is_mapped);
 
 	note_sheer(mesh, "differential points");
-	for (uint32_t m = 0; m < mesh->n_materials; m++)
-		if (mesh->material[m].normal_texture.image >= 0 && mesh->material[m].normal_scale != 0)
-			n += count_triangles(mesh, m);
 	if (n > 0)
 		fprintf(stderr, NOTE "%" PRIu32 " of %" PRIu32 " triangles have normal maps, which differential points do not show;"
 		        " blocks and octrees do\n", n, mesh->n_triangles);

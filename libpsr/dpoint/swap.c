@@ -11,8 +11,8 @@ struct over {
 	uint32_t n, sum;
 };
 
-/* over: by cell, in the order of the tree. By candidate: over how many cells a kept one is alone, and how many of these are `lost` to the
- * one that is looked at. */
+/* over: by cell, in the order of the tree. By candidate: over how many cells a kept one is alone, and how many of these
+ * are `lost` to the one that is looked at. */
 struct swapping {
 	const struct dpoint_cover *cover;
 	uint8_t *is_kept;

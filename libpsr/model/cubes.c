@@ -119,7 +119,8 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 	struct psr_cubes *cubes = m->cubes;
 	const size_t n_cubes = cubes->groups.n_blocks, n_clusters = m->tree->n_skips * (uint64_t)m->n_levels;
 	const int has_cones = psr_octree_is_one_sided(m->tree), has_traits = has_cones && m->tree->lean != NULL;
-	size_t n = n_cubes * (sizeof *m->cube + sizeof *m->flags + (has_cones ? 4 : 0) + (has_traits ? 1 : 0)) + n_clusters * sizeof *m->cluster;
+	const size_t n_bytes = sizeof *m->flags + (has_cones ? 4 : 0) + (has_traits ? 1 : 0);
+	size_t n = n_cubes * (sizeof *m->cube + n_bytes) + n_clusters * sizeof *m->cluster;
 	struct psr_cube_bound *bound;
 	struct psr_cube_run *run;
 	char *memory;

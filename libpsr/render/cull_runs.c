@@ -219,8 +219,7 @@ static void take_run(struct cull_counting *to, const struct psr_cube_level *leve
 	}
 	batch.sum.left = chosen;
 	batch.sum.mixed = facing == CULL_FACES_EYE ? 0 : chosen;
-	if (facing == CULL_MIXED && (in->cull.with_cones || in->cull.blocks->traits != NULL)
-	    && in->cull.blocks->cone_sine != NULL)
+	if (facing == CULL_MIXED && cull_asks_cones(&in->cull))
 		to->simd->cull_cones(&batch, &in->cull, run->first, run->n);
 	const uint64_t left = batch.sum.left & chosen, mixed = batch.sum.mixed & chosen;
 	for (int w = 0; w <= told.widest; w++) {

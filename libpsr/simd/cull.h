@@ -25,6 +25,12 @@ struct cull_view {
 	float region_from[2], region_scale[2];
 };
 
+/* Whether cones are asked: those of bent blocks are, whatever the view wants, as their samples cannot tell. */
+static inline int cull_asks_cones(const struct cull_view *view)
+{
+	return view->blocks->cone_sine != NULL && (view->with_cones || view->blocks->traits != NULL);
+}
+
 /* Returns the depth buffer's level for samples that are so far apart: the smallest k >= 0 with pixels <= 2^k ([G]
  * 7.11), from the exponent. Pixels are a stretch times a spacing times CULL_LESS: so rounding does not double the cells of a
  * picture at exactly the magnification of a level. Of NaN, 0 times infinity, k is that of 2^100. */

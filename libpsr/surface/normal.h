@@ -23,6 +23,11 @@ void normal_jacobian(const struct plane *plane, const double side[2][2], double 
  * without area: the vertices', or +z. */
 void normal_interpolate(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, float normal[3]);
 
+static inline int normal_is_mapped(const struct psr_material *material)
+{
+	return material->normal_texture.image >= 0 && material->normal_scale != 0;
+}
+
 /* Turns `normal` (normal_interpolate) by a normal map's vector `mapped`, of any length but 0. The tangent is the mesh's
  * own, or else the direction of growing s, by the texture's jacobian (normal_jacobian); the bitangent is perpendicular
  * to both, on the side of falling t. A jacobian of determinant 0 changes nothing. */

@@ -69,12 +69,13 @@ static int put_leaves(struct meeting *m, const uint32_t at[3], int up)
 static int put_triangle(struct meeting *m, const struct octree_surface *s, const uint32_t triangle[3])
 {
 	const int most = (1 << m->levels) - 1;
+	const double edge = ldexp(1.0, m->levels), scale = edge / s->edge;
 	uint32_t at[3];
 	int up = 0;
 
 	for (int i = 0; i < 3; i++)
 		for (int c = 0; c < 3; c++)
-			m->corner[i][c] = octree_surface_place(s, triangle[i], c, m->levels);
+			m->corner[i][c] = octree_surface_place(s, triangle[i], c, edge, scale);
 	for (int i = 0; i < 3; i++)
 		v3d_sub(m->side[i], m->corner[(i + 1) % 3], m->corner[i]);
 	v3d_cross(m->normal, m->side[0], m->side[1]);

@@ -2,7 +2,6 @@
 #ifndef PSR_OCTREE_BUILD_VOXELS_H
 #define PSR_OCTREE_BUILD_VOXELS_H
 
-#include <math.h>
 #include <stddef.h>
 #include "octree/octree.h"
 #include "base/pool.h"
@@ -15,12 +14,14 @@ struct octree_surface {
 	const struct psr_cancel *cancel; /* may be NULL */
 };
 
-/* Finds where a vertex is along an axis, in leaves of trees of so many levels: within the cube, however places round. */
-static inline double octree_surface_place(const struct octree_surface *surface, uint32_t vertex, int axis, int levels)
+/* Finds where a vertex is along an axis, in leaves, of which there are `side` along the cube's edge, `scale` a unit:
+ * within the cube, however places round. */
+static inline double octree_surface_place(const struct octree_surface *surface, uint32_t vertex, int axis, double side,
+                                          double scale)
 {
-	const double most = ldexp(1.0, levels), at = (surface->position[vertex][axis] - surface->low[axis]) * (most / surface->edge);
+	const double at = (surface->position[vertex][axis] - surface->low[axis]) * scale;
 
-	return at < 0.0 ? 0.0 : at > most ? most : at;
+	return at < 0.0 ? 0.0 : at > side ? side : at;
 }
 
 /* Builds a tree without attributes: a leaf for each closed cell that a triangle meets. Sorts in `memory` bytes, in runs

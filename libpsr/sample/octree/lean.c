@@ -3,6 +3,7 @@
 #include "lean.h"
 #include "base/maths.h"
 #include "base/vec.h"
+#include "surface/normal.h"
 
 #define SLIT 4.0          /* leaves: what is narrower is filled in. A face so wide in sight is not, at the finest level */
 #define LEAST_DEGREES 10  /* of a mapped normal, which leans on however small a face */
@@ -21,15 +22,9 @@ static double face_of(double face[3], const struct facet *facet)
 	return longest > 0 ? v3d_normalize(face, face) / longest : 0;
 }
 
-static int has_map(const struct psr_mesh *mesh, uint32_t triangle)
-{
-	const struct psr_material *material = &mesh->material[mesh->triangle_material[triangle]];
-
-	return material->normal_texture.image >= 0 && material->normal_scale != 0;
-}
-
 void lean_add(struct lean *lean, uint64_t path, const float normal[3], const struct facet *facet, size_t n_facets)
 {
+	const struct psr_mesh *mesh = lean->mesh;
 	struct lean_cell *cell = &lean->cell[octree_lean_first(path, lean->levels)];
 	double sum[3] = { 0 }, cosine = 0, width = 0;
 	int is_mapped = 0;
@@ -39,7 +34,7 @@ void lean_add(struct lean *lean, uint64_t path, const float normal[3], const str
 		double face[3];
 
 		width = fmax(width, face_of(face, &facet[i]));
-		is_mapped |= has_map(lean->mesh, facet[i].triangle);
+		is_mapped |= normal_is_mapped(&mesh->material[mesh->triangle_material[facet[i].triangle]]);
 		v3d_add_scaled(sum, sum, lean->is_turned[facet[i].triangle] ? -facet[i].area : facet[i].area, face);
 	}
 	if (v3d_normalize(sum, sum) == 0)

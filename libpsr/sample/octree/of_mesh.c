@@ -27,6 +27,7 @@ struct leaf_maker {
 	struct surface look;
 	uint8_t *is_turned;
 	int levels;
+	double side, scale;        /* leaves: along the cube, and a unit of the mesh */
 	struct octree_maker maker;
 	uint64_t room;
 	struct facet *facet;       /* of the leaf that is made */
@@ -109,7 +110,7 @@ static int find_facets(struct leaf_maker *m, const uint32_t at[3], const uint32_
 		for (int k = 0; k < 3; k++)
 			for (int c = 0; c < 3; c++)
 				facet->corner[k][c] =
-					octree_surface_place(&m->surface, m->mesh->triangle[triangle[i]][k], c, m->levels) - at[c];
+					octree_surface_place(&m->surface, m->mesh->triangle[triangle[i]][k], c, m->side, m->scale) - at[c];
 		clip_triangle(&clip, (const double(*)[3])facet->corner);
 		if (clip.n == 0 || clip_is_next_ones(&clip, is_last))
 			continue;
@@ -345,6 +346,8 @@ static int build(struct leaf_maker *m)
 		rc = surface_init(&m->look, m->mesh, ldexp(m->surface.edge, -m->levels));
 	if (rc != PSR_OK)
 		return psr_fail(m->err, rc, "no memory for a surface of %u triangles", m->mesh->n_triangles);
+	m->side = ldexp(1.0, m->levels);
+	m->scale = m->side / m->surface.edge;
 	rc = octree_maker_init(&m->maker, m->levels, m->err);
 	if (rc == PSR_OK)
 		rc = octree_surface_walk(&m->surface, m->levels, &room, make_leaf, m, m->err);

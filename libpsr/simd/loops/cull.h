@@ -214,7 +214,7 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 	if (view->points)
 		for (uint32_t i = 0; i < n; i++)
 			out->depth_error[i] *= view->points->set->height * 0x1p15f;
-	if (view->blocks->cone_sine && (view->with_cones || view->blocks->traits)) {
+	if (cull_asks_cones(view)) {
 		widen_cones(&blocks, view->blocks, first, n);
 		cull_by_cones(out, view, &blocks, whole);
 	}
