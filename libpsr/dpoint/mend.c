@@ -74,6 +74,12 @@ static enum dpoint_made flat_patch(struct dpoint_candidate *out, const struct dp
 	return dpoint_candidate_make(out, is_good ? &local : NULL, &like);
 }
 
+int plane_over(struct dpoint_candidate *out, const struct dpoint_surface *surface, uint32_t cell,
+               const struct dpoint_cover_options *options)
+{
+	return flat_patch(out, surface, cell, options, 0, 1) != DPOINT_BAD;
+}
+
 /* Kinds of patches over a cell. From SECOND on they are as the flat one, along other sides. */
 enum kind { BENT, FLAT, OWN, SECOND, THIRD, FOURTH, N_KINDS };
 
@@ -269,7 +275,7 @@ int mend_planes(struct dpoint_surface *surface, struct dpoint_cover *cover, cons
 	for (uint32_t i = 0; i < surface->n_cells && rc == PSR_OK; i++) {
 		struct dpoint_candidate plane, *candidate;
 
-		if (!is_open[i] || flat_patch(&plane, surface, i, options, 0, 1) == DPOINT_BAD ||
+		if (!is_open[i] || !plane_over(&plane, surface, i, options) ||
 		    (options->error > 0 &&
 		     !(error_of(&view, surface, &plane, options, (double)options->error) <= (double)options->error)))
 			continue;

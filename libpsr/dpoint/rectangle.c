@@ -35,6 +35,18 @@ void looking_init(struct looking *l, const struct dpoint_surface *surface, const
 	find_sure(l, options->angle);
 }
 
+void cell_plane(float normal[3], const struct dpoint_cell *cell)
+{
+	float a[3], b[3];
+
+	v3f_sub(a, cell->corner[2], cell->corner[0]);
+	v3f_sub(b, cell->corner[3], cell->corner[1]);
+	v3f_cross(normal, a, b);
+	v3f_normalize(normal, normal);
+	if (v3f_dot(normal, cell->normal) < 0)
+		v3f_scale(normal, normal, -1);
+}
+
 float cell_area(const struct dpoint_cell *cell)
 {
 	float a[3], b[3], n[3];

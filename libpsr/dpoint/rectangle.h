@@ -15,6 +15,9 @@ struct looking {
 void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
                   const struct dpoint_cover_options *options);
 
+/* Finds the normal of a cell's plane, on the side of its own normal; 0,0,0 where it has no area. */
+void cell_plane(float normal[3], const struct dpoint_cell *cell);
+
 float cell_area(const struct dpoint_cell *cell);
 
 struct rectangle {
@@ -114,6 +117,10 @@ int fit_candidates(struct dpoint_surface *surface, const struct cell_tree *tree,
 struct bound_view;
 int shrink_within(struct dpoint_candidate *c, const struct dpoint_candidate *before, struct bound_view *view,
                   const struct looking *l);
+
+/* Makes a flat candidate in the plane of a cell, around it. Returns 0 where there is none. */
+int plane_over(struct dpoint_candidate *out, const struct dpoint_surface *surface, uint32_t cell,
+               const struct dpoint_cover_options *options);
 
 /* Adds a flat candidate in the plane of each cell that is_open is set for, and to the cover. With options->error they
  * keep it, or are left out. MEMORY, CANCELLED. */

@@ -17,7 +17,7 @@ static void look(int chunk, void *userdata)
 
 	for (size_t i = begin; i < end; i++)
 		if (s->is_open[i])
-			s->is_open[i] = (uint8_t)!is_sealed(s, &nearby, (uint32_t)i);
+			s->is_open[i] = (uint8_t)!s->is_closed(s, &nearby, (uint32_t)i);
 	if (nearby.is_failed)
 		__atomic_store_n(&s->is_failed, 1, __ATOMIC_RELAXED);
 	free(nearby.near);
@@ -61,7 +61,19 @@ static void find_over(struct sealing *s, const struct dpoint_choice *choice, con
 	}
 }
 
-static int look_all(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_work *work)
+void sealing_init(struct sealing *s, const struct dpoint_surface *surface, const struct dpoint_cover_options *options)
+{
+	*s = (struct sealing){ .surface = surface, .options = options, .behind = BEHIND * options->height };
+	for (int d = 0; d < AROUND_GRAZING; d++) {
+		double sine, cosine;
+
+		psr_sincos(d * (2 * 3.14159265358979 / AROUND_GRAZING), &sine, &cosine);
+		s->around[d][0] = (float)cosine;
+		s->around[d][1] = (float)sine;
+	}
+}
+
+int sealing_look(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_work *work)
 {
 	int rc = make_lids(s, choice, work->pool);
 
@@ -74,7 +86,7 @@ static int look_all(struct sealing *s, const struct dpoint_choice *choice, const
 	return rc == PSR_OK && s->is_failed ? PSR_ERR_MEMORY : rc;
 }
 
-static int keep_planes(struct dpoint_choice *choice, size_t before, size_t n)
+int keep_added(struct dpoint_choice *choice, size_t before, size_t n)
 {
 	uint8_t *is_kept = realloc(choice->is_kept, n + 1);
 
@@ -86,45 +98,35 @@ static int keep_planes(struct dpoint_choice *choice, size_t before, size_t n)
 	return PSR_OK;
 }
 
-static void set_around(struct sealing *s)
-{
-	for (int d = 0; d < AROUND_GRAZING; d++) {
-		double sine, cosine;
-
-		psr_sincos(d * (2 * 3.14159265358979 / AROUND_GRAZING), &sine, &cosine);
-		s->around[d][0] = (float)cosine;
-		s->around[d][1] = (float)sine;
-	}
-}
-
 int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
          const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
-	struct sealing s = { .surface = surface, .options = options, .behind = BEHIND * options->height };
 	const size_t before = surface->n_candidates;
+	struct sealing s;
 	int rc;
 
 	if (choice->n_kept == 0 || surface->is_cloud)
 		return PSR_OK;
-	set_around(&s);
+	sealing_init(&s, surface, options);
+	s.is_closed = is_sealed;
 	s.is_open = malloc(surface->n_cells);
 	s.over = malloc(surface->n_cells * sizeof *s.over);
 	rc = s.is_open != NULL && s.over != NULL ? PSR_OK : PSR_ERR_MEMORY;
 	if (rc == PSR_OK) {
 		memset(s.is_open, 1, surface->n_cells);
 		find_over(&s, choice, cover);
-		rc = look_all(&s, choice, work);
+		rc = sealing_look(&s, choice, work);
 	}
 	free(s.over); /* of these lids */
 	s.over = NULL;
 	if (rc == PSR_OK)
 		rc = keep_over_open(choice, cover, s.is_open);
 	if (rc == PSR_OK)
-		rc = look_all(&s, choice, work);
+		rc = sealing_look(&s, choice, work);
 	if (rc == PSR_OK)
 		rc = mend_planes(surface, cover, s.is_open, options, work);
 	if (rc == PSR_OK)
-		rc = keep_planes(choice, before, surface->n_candidates);
+		rc = keep_added(choice, before, surface->n_candidates);
 	free(s.is_open);
 	return rc;
 }

@@ -14,7 +14,6 @@
 #define STEEP (1 + 2 * AROUND) /* rays to any cell; more graze cells of two sides */
 #define DIRECTIONS (STEEP + AROUND_GRAZING)
 
-#define GRAZING 0.07f
 #define ALONG_SADDLE 4 /* rays along both lines in which a saddle does not bend, either way */
 #define LEAST_SADDLE 0.01f /* -rho */
 
@@ -22,7 +21,7 @@
  * cells of two sides alone: who looks into what is hollow and open sees its walls aslant as far as they go. */
 static const float slant[2] = { 0.65f, LID_LEAST_COSINE };
 
-static void gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius)
+void nearby_gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius)
 {
 	const struct cell_ball *ball = &s->tree.ball[i];
 	const struct cell_node *node = &s->tree.node[i];
@@ -32,8 +31,8 @@ static void gather(struct nearby *nearby, const struct sealing *s, size_t i, con
 	if (v3f_dot(away, away) > (ball->radius + radius) * (ball->radius + radius))
 		return;
 	if (!cell_node_is_leaf(node)) {
-		gather(nearby, s, 2 * i + 1, middle, radius);
-		gather(nearby, s, 2 * i + 2, middle, radius);
+		nearby_gather(nearby, s, 2 * i + 1, middle, radius);
+		nearby_gather(nearby, s, 2 * i + 2, middle, radius);
 		return;
 	}
 	if (!ARRAY_ROOM(nearby->near, nearby->n, nearby->room)) {
@@ -83,15 +82,11 @@ static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, co
 /* Where rays to a cell come from: its plane's normal, and around it. Returns 0 of a cell without an area. */
 static int directions(float (*from)[3], const struct sealing *s, const struct dpoint_cell *cell)
 {
-	float a[3], b[3], x[3], y[3], normal[3];
+	float x[3], y[3], normal[3];
 
-	v3f_sub(a, cell->corner[2], cell->corner[0]);
-	v3f_sub(b, cell->corner[3], cell->corner[1]);
-	v3f_cross(normal, a, b);
-	if (v3f_normalize(normal, normal) == 0)
+	cell_plane(normal, cell);
+	if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
 		return 0;
-	if (v3f_dot(normal, cell->normal) < 0)
-		v3f_scale(normal, normal, -1);
 	dpoint_tangents(x, y, normal);
 	memcpy(from[0], normal, sizeof from[0]);
 	for (int d = 1; d < DIRECTIONS; d++) {
@@ -154,7 +149,6 @@ static int stops_rays(const struct sealing *s, struct nearby *nearby, const stru
                       const float (*from)[DIRECTIONS][3], const float middle[3])
 {
 	const int n_sides = 1 + dpoint_is_two_sided(s->options, cell->part);
-
 	for (int side = 0; side < n_sides; side++)
 		for (int p = 0; p < PLACES; p++) {
 			float place[3];
@@ -230,7 +224,7 @@ static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const
 	if (s->surface->facets.n > 0 || dpoint_is_two_sided(s->options, cell->part))
 		return 1;
 	nearby->n = 0;
-	gather(nearby, s, 0, middle, radius);
+	nearby_gather(nearby, s, 0, middle, radius);
 	const struct rectangle *saddle = find_saddle(s, nearby, middle);
 	if (saddle == NULL)
 		return 1;
@@ -238,7 +232,7 @@ static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const
 	if (stops_along(s, nearby, cell, (const float (*)[3])from, middle))
 		return 1;
 	nearby->n = 0;
-	gather(nearby, s, 0, middle, radius + 2 * GRAZED * s->behind);
+	nearby_gather(nearby, s, 0, middle, radius + 2 * GRAZED * s->behind);
 	return stops_along(s, nearby, cell, (const float (*)[3])from, middle);
 }
 
@@ -263,11 +257,10 @@ int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
 		return 1;
 	for (int is_all = 0; is_all < 2; is_all++) {
 		nearby->n = 0;
-		gather(nearby, s, 0, middle, radius + (is_all ? 2 * s->behind : 0));
+		nearby_gather(nearby, s, 0, middle, radius + (is_all ? 2 * s->behind : 0));
 		put_first(nearby, middle);
 		if (stops_rays(s, nearby, cell, (const float (*)[DIRECTIONS][3])from, middle))
 			return 1;
 	}
 	return 0;
 }
-

@@ -1,4 +1,4 @@
-/* Whether rays to a cell slip through between lids: what seal.c asks of each. */
+/* Whether rays to a cell slip through between lids: what seal.c and lining.c ask of each. */
 #ifndef PSR_DPOINT_SEALED_H
 #define PSR_DPOINT_SEALED_H
 
@@ -6,17 +6,7 @@
 
 #define AROUND 8  /* directions of a slant */
 #define AROUND_GRAZING (2 * AROUND) /* odd ones are those of a slant */
-
-struct sealing {
-	const struct dpoint_surface *surface;
-	const struct dpoint_cover_options *options;
-	struct lid *lid;
-	uint32_t *over;        /* by cell: a lid that covers it, or UINT32_MAX; NULL: not known */
-	struct cell_tree tree; /* of the lids' corners */
-	uint8_t *is_open;      /* by cell */
-	float around[AROUND_GRAZING][2], behind;
-	int is_failed;
-};
+#define GRAZING 0.07f /* cosine to a plane's normal of rays that graze it */
 
 /* Lids around a cell. */
 struct near_lid {
@@ -30,8 +20,29 @@ struct nearby {
 	int is_failed;
 };
 
-/* Whether the lids stop all rays that are looked at to a cell (seal.h). nearby: room, kept from cell to cell; is_failed:
- * no memory. */
+struct sealing {
+	const struct dpoint_surface *surface;
+	const struct dpoint_cover_options *options;
+	struct lid *lid;
+	uint32_t *over;        /* by cell: a lid that covers it, or UINT32_MAX; NULL: not known */
+	struct cell_tree tree; /* of the lids' corners */
+	uint8_t *is_open;      /* by cell */
+	float around[AROUND_GRAZING][2], behind;
+	/* What is asked of a cell. nearby: room, kept from cell to cell; is_failed: no memory. */
+	int (*is_closed)(const struct sealing *s, struct nearby *nearby, uint32_t at);
+	int is_failed;
+};
+
+/* is_open is NULL: the caller's to make, and to free. */
+void sealing_init(struct sealing *s, const struct dpoint_surface *surface, const struct dpoint_cover_options *options);
+
+/* Of the cells that is_open is set for, clears it for those that the kept candidates close. MEMORY, CANCELLED. */
+int sealing_look(struct sealing *s, const struct dpoint_choice *choice, const struct dpoint_work *work);
+
+/* Adds the lids, of the tree's node i and below, whose balls meet the ball around a place. */
+void nearby_gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius);
+
+/* Whether the lids stop all rays that are looked at to a cell (seal.h). */
 int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at);
 
 #endif

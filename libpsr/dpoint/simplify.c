@@ -137,6 +137,8 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 	if (rc == PSR_OK)
 		rc = seal(surface, choice, cover, options, &work);
 	if (rc == PSR_OK)
+		rc = line_slits(surface, choice, cover, options, &work);
+	if (rc == PSR_OK)
 		paint(surface, choice, cover, options);
 	return rc;
 }

@@ -29,6 +29,7 @@ struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface)
 {
 	if (surface->n_cells == UINT32_MAX || !ARRAY_ROOM(surface->cell, surface->n_cells, surface->cells_room))
 		return NULL;
+	memset(&surface->cell[surface->n_cells], 0, sizeof *surface->cell);
 	return &surface->cell[surface->n_cells++];
 }
 

@@ -15,6 +15,8 @@ struct dpoint_cell {
 	float normal[3];   /* in its middle, of unit length; 0,0,0 where there is none, at poles */
 	uint32_t part;     /* of the source: a patch, a material; or DPOINT_BEYOND */
 	uint64_t attr;     /* of points in it, without a normal */
+	float slit;        /* how much higher one corner of its face is than another, along the cell's normal, where that
+	                    * leans from the face: rectangles on such normals stand as slats do; else 0 */
 };
 
 static inline void dpoint_cell_middle(float m[3], const struct dpoint_cell *cell)
@@ -58,7 +60,7 @@ void dpoint_surface_fini(struct dpoint_surface *surface);
 /* Makes room for so many elements in all. Returns 0 without memory, or if they are more than there may be. */
 int dpoint_surface_reserve(struct dpoint_surface *surface, size_t n_cells, size_t n_candidates, size_t n_facets);
 
-/* Add one element. Return NULL without memory. */
+/* Add one element, cells of zeros. Return NULL without memory. */
 struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface);
 struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface);
 
@@ -88,6 +90,7 @@ struct dpoint_cover_options {
 	 * So neighbours overlap, and what words tilt them by is no gap from aslant. */
 	float margin, delta;
 	float graze;       /* that slanted rays may count on (seal.h): half of what is drawn; 0: none */
+	float slit;        /* dpoint_simplify() lines faces whose slit is wider; 0: none */
 	const uint8_t *is_two_sided; /* by part: rectangles that are seen from both sides; NULL: none is */
 };
 

@@ -10,6 +10,7 @@
 
 #define OVERHANG 5e-4f
 #define SLACK 2e-5f       /* half a step of a place */
+#define SLIT 2            /* pixels: who sees a wider one sees through it */
 #define SPARSE 4          /* of candidates that come in two turns */
 
 void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)
@@ -67,7 +68,7 @@ struct dpoint_cover_options building_cover(const struct dpoint_build_options *o)
 	struct dpoint_cover_options cover = {
 		.sine = dpoint_sine(o->epsilon), .slack = SLACK, .angle = (float)(o->degrees * PSR_DEGREE),
 		.height = (float)o->height, .overhang = OVERHANG, .looks = BUILDING_LOOKS, .delta = delta_of(o),
-		.graze = 0.5f * dpoint_graze(o->resolution),
+		.graze = 0.5f * dpoint_graze(o->resolution), .slit = (float)(SLIT * pixel_of(o)),
 	};
 
 	if (o->error > 0) {
