@@ -152,6 +152,49 @@ static void find_layer(struct sheer_tile *l, const struct plan *plan, const stru
 	list->n = n;
 }
 
+static float z_of(uint64_t word)
+{
+	return psr_float_from_bits((uint32_t)(word >> 32));
+}
+
+/* Closes pixel `at` if the layer goes on beside it at both of two places, as deep to less than its thickness, and lacks
+ * it: there is nothing, or what lies further behind. */
+static int close_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, const uint64_t beside[2])
+{
+	const float z[2] = { z_of(beside[0]), z_of(beside[1]) }, middle = 0.5f * (z[0] + z[1]);
+	const uint32_t slot = (uint32_t)beside[0] / PSR_BLOCK_SAMPLES, n = plan_find_instance(plan, slot);
+	const struct plan_instance *in = &plan->instance[n];
+	const float thick = LAYER_STEPS * splat_rim(in, slot - in->first_slot);
+
+	if (!(__builtin_fabsf(z[0] - z[1]) < thick && z_of(l->word[at]) - middle > 2 * thick) || middle <= l->beyond[at] ||
+	    middle >= l->before[at])
+		return 0;
+	l->word[at] = (uint64_t)psr_bits_from_float(middle) << 32 | (uint32_t)beside[0];
+	return 1;
+}
+
+/* Closes single pixels that no sample of a layer met, as where two projections of a model meet. One that nothing met, with
+ * layers all around, shows the farther of those beside it: there the outline of what is in front passes. */
+static void close_layer(struct sheer_tile *l, const struct plan *plan, const struct sheer_area *area)
+{
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (size_t at = sheer_place(area, y) + 1, x = 1; x + 1 < area->width; at++, x++) {
+			const uint64_t word = l->word[at], row[2] = { l->word[at - 1], l->word[at + 1] };
+
+			if (word > row[0] && word > row[1] && close_pixel(l, plan, at, row))
+				continue;
+			if (y == area->low_y || y + 1 == area->high_y)
+				continue;
+			const uint64_t column[2] = { l->word[at - WARP_OWN_STRIDE], l->word[at + WARP_OWN_STRIDE] };
+
+			if (!(word > column[0] && word > column[1]) || close_pixel(l, plan, at, column))
+				continue;
+			const uint64_t farther = row[0] > row[1] ? row[0] : row[1];
+			if (word == PSR_WORD_EMPTY && l->beyond[at] == 0 && word > farther && z_of(farther) < l->before[at])
+				l->word[at] = farther;
+		}
+}
+
 /* Returns how many pixels the layer has. */
 static uint64_t add_layer(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
@@ -262,6 +305,7 @@ static void draw_glass(struct sheer_tile *l, struct sheer_drawing *d, const stru
 	}
 	for (int layer = 0; layer < MOST_LAYERS; layer++) {
 		find_layer(l, d->plan, area);
+		close_layer(l, d->plan, area);
 		if (!add_layer(l, d, area))
 			break;
 	}
