@@ -8,12 +8,17 @@
 void lid_make(struct lid *lid, const struct dpoint_candidate *candidate, const struct dpoint_cover_options *options)
 {
 	struct rectangle *r = &lid->rectangle;
+	float most[3];
 
 	rectangle_of(r, candidate, options);
 	lid->is_two_sided = dpoint_is_two_sided(options, candidate->part);
 	lid->graze = options->graze;
-	for (int k = 0; k < 2; k++)
+	for (int k = 0; k < 2; k++) {
 		r->extent[k] = fmaxf(0, r->extent[k] - options->slack);
+		most[k] = r->extent[k] + DPOINT_GRAZES * lid->graze;
+	}
+	most[2] = 0.5f * fabsf(r->lambda_u) * (most[0] * most[0] + fabsf(r->rho) * most[1] * most[1]);
+	lid->reach = 1.01f * v3f_length(most) + 1e-6f;
 }
 
 void lid_corners(struct dpoint_cell *cell, const struct lid *lid)

@@ -18,28 +18,19 @@ static float back_of(const struct dpoint_cover_options *options)
 	return options->error > 0 ? fminf(back, 0.5f * options->error) : back;
 }
 
-/* Stops those of the open rays that graze a plane, on their way to the place `at`, which the lid is in the way of. One
- * that passes the lid's ball aside is not looked at. Returns how many are left. */
-static int stop_grazing(uint8_t *is_stopped, int n_open, const struct sealing *s, const struct lid *lid,
-                        const float at[3], const float axis[3][3], const float (*from)[3])
+/* Stops those of the open rays to the place `at` that the lid is in the way of. Returns how many are left. */
+static int stop_grazing(uint8_t *is_stopped, int n_open, const struct lid *lid, const float at[3],
+                        const float (*from)[3])
 {
-	const struct rectangle *r = &lid->rectangle;
-	const float reach = r->extent[0] + r->extent[1] + DPOINT_GRAZES * lid->graze;
-	float seen[3], away[3], x, y;
+	float away[3], seen[3];
 
-	v3f_sub(away, r->at, at);
-	x = v3f_dot(away, axis[0]);
-	y = v3f_dot(away, axis[1]);
-	rectangle_sees(seen, r, at);
-	for (int d = 0; d < AROUND_GRAZING; d++) {
-		const float *turn = s->around[d];
-
-		if (is_stopped[d] || fabsf(x * turn[1] - y * turn[0]) > reach || x * turn[0] + y * turn[1] < -reach ||
-		    !lid_stops(lid, seen, from[d], 0))
-			continue;
-		is_stopped[d] = 1;
-		n_open--;
-	}
+	v3f_sub(away, at, lid->rectangle.at);
+	rectangle_sees(seen, &lid->rectangle, at);
+	for (int d = 0; d < AROUND_GRAZING; d++)
+		if (!is_stopped[d] && lid_may_stop(lid, away, from[d], 0) && lid_stops(lid, seen, from[d], 0)) {
+			is_stopped[d] = 1;
+			n_open--;
+		}
 	return n_open;
 }
 
@@ -66,8 +57,7 @@ static int is_lined(const struct sealing *s, struct nearby *nearby, uint32_t at)
 	nearby->n = 0;
 	nearby_gather(nearby, s, 0, place, 1.2f * deep / GRAZING);
 	for (size_t i = 0; i < nearby->n && n_open > 0; i++)
-		n_open = stop_grazing(is_stopped, n_open, s, nearby->near[i].lid, place, (const float (*)[3])axis,
-		                      (const float (*)[3])from);
+		n_open = stop_grazing(is_stopped, n_open, nearby->near[i].lid, place, (const float (*)[3])from);
 	return n_open == 0;
 }
 

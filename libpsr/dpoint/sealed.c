@@ -42,39 +42,71 @@ void nearby_gather(struct nearby *nearby, const struct sealing *s, size_t i, con
 	nearby->near[nearby->n++].lid = &s->lid[s->tree.order[node->begin]];
 }
 
-/* Stops those of the open rays that the lid is in the way of. Returns how many are left. */
-static int stop_rays(uint8_t *is_stopped, int n_open, int n, const struct lid *lid, const float p[3],
+/* Leaves out those of the open rays to a place that the lid stops: `open` has their directions, one after the other; p is
+ * the place in the lid's frame. Returns how many are left. */
+static int stop_rays(uint8_t *open, int n_open, const struct lid *lid, const float at[3], const float p[3],
                      const float (*from)[3], float behind)
 {
+	float away[3];
+	int n = 0;
+
+	v3f_sub(away, at, lid->rectangle.at);
+	for (int i = 0; i < n_open; i++) {
+		const int d = open[i];
+		const float after = d < STEEP ? behind : GRAZED * behind;
+
+		open[n] = (uint8_t)d;
+		n += !lid_may_stop(lid, away, from[d], after) || !lid_stops(lid, p, from[d], after);
+	}
+	return n;
+}
+
+static int open_all(uint8_t *open, int n)
+{
 	for (int d = 0; d < n; d++)
-		if (!is_stopped[d] && lid_stops(lid, p, from[d], d < STEEP ? behind : GRAZED * behind)) {
-			is_stopped[d] = 1;
-			n_open--;
-		}
-	return n_open;
+		open[d] = (uint8_t)d;
+	return n;
+}
+
+/* Some of the lids nearby. */
+struct lids {
+	struct near_lid *near;
+	size_t n;
+};
+
+static struct lids lids_of(const struct nearby *nearby, size_t begin, size_t end)
+{
+	return (struct lids){ nearby->near + begin, end - begin };
+}
+
+static void see_place(struct lids lids, const float at[3])
+{
+	for (size_t i = 0; i < lids.n; i++) {
+		struct near_lid *near = &lids.near[i];
+		const float *extent = near->lid->rectangle.extent;
+
+		rectangle_sees(near->place, &near->lid->rectangle, at);
+		near->is_over = fabsf(near->place[0]) <= extent[0] && fabsf(near->place[1]) <= extent[1];
+	}
 }
 
 /* Lids over the place come first: they stop most rays. */
-static int is_sealed_at(const struct sealing *s, const struct nearby *nearby, const float at[3],
+static int is_sealed_at(const struct sealing *s, struct lids lids, const float at[3],
                         const float (*from)[3], const float normal[3], int n)
 {
-	int n_open = n;
-	uint8_t is_stopped[DIRECTIONS] = { 0 };
+	uint8_t open[DIRECTIONS];
+	int n_open = open_all(open, n);
 
-	for (size_t i = 0; i < nearby->n; i++) {
-		struct near_lid *near = &nearby->near[i];
-
-		rectangle_sees(near->place, &near->lid->rectangle, at);
-		if (lid_stops_all(near->lid, near->place, normal, n > STEEP ? GRAZING : LID_LEAST_COSINE, s->behind))
+	for (size_t i = 0; i < lids.n; i++)
+		if (lids.near[i].is_over && lid_stops_all(lids.near[i].lid, lids.near[i].place, normal,
+		                                           n > STEEP ? GRAZING : LID_LEAST_COSINE, s->behind))
 			return 1;
-	}
 	for (int is_over = 1; is_over >= 0; is_over--)
-		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
-			const struct near_lid *near = &nearby->near[i];
-			const float *p = near->place, *extent = near->lid->rectangle.extent;
+		for (size_t i = 0; i < lids.n && n_open > 0; i++) {
+			const struct near_lid *near = &lids.near[i];
 
-			if ((fabsf(p[0]) <= extent[0] && fabsf(p[1]) <= extent[1]) == is_over)
-				n_open = stop_rays(is_stopped, n_open, n, near->lid, p, from, s->behind);
+			if (near->is_over == is_over)
+				n_open = stop_rays(open, n_open, near->lid, at, near->place, from, s->behind);
 		}
 	return n_open == 0;
 }
@@ -101,19 +133,19 @@ static int directions(float (*from)[3], const struct sealing *s, const struct dp
 }
 
 /* Brings lids over the place to the front: there they are asked first. */
-static void put_first(struct nearby *nearby, const float at[3])
+static void put_first(struct lids lids, const float at[3])
 {
 	size_t n = 0;
 
-	for (size_t i = 0; i < nearby->n; i++) {
-		const struct near_lid near = nearby->near[i];
+	for (size_t i = 0; i < lids.n; i++) {
+		const struct near_lid near = lids.near[i];
 		const struct rectangle *r = &near.lid->rectangle;
 		float p[3];
 
 		rectangle_sees(p, r, at);
 		if (fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]) {
-			nearby->near[i] = nearby->near[n];
-			nearby->near[n++] = near;
+			lids.near[i] = lids.near[n];
+			lids.near[n++] = near;
 		}
 	}
 }
@@ -144,19 +176,16 @@ static int stops_all(const struct sealing *s, const struct lid *lid, const struc
 	return 1;
 }
 
-/* Whether these lids stop all rays to the cell, from both sides if it has two. */
-static int stops_rays(const struct sealing *s, struct nearby *nearby, const struct dpoint_cell *cell,
-                      const float (*from)[DIRECTIONS][3], const float middle[3])
+/* Whether these lids stop all rays to a place of the cell, from both sides if it has two. */
+static int stops_rays(const struct sealing *s, struct lids lids, const struct dpoint_cell *cell,
+                      const float (*from)[DIRECTIONS][3], const float place[3])
 {
 	const int n_sides = 1 + dpoint_is_two_sided(s->options, cell->part);
-	for (int side = 0; side < n_sides; side++)
-		for (int p = 0; p < PLACES; p++) {
-			float place[3];
 
-			place_of(place, cell, middle, p);
-			if (!is_sealed_at(s, nearby, place, from[side], from[side][0], n_sides == 1 ? STEEP : DIRECTIONS))
-				return 0;
-		}
+	see_place(lids, place);
+	for (int side = 0; side < n_sides; side++)
+		if (!is_sealed_at(s, lids, place, from[side], from[side][0], n_sides == 1 ? STEEP : DIRECTIONS))
+			return 0;
 	return 1;
 }
 
@@ -198,14 +227,14 @@ static int stops_along(const struct sealing *s, const struct nearby *nearby, con
                        const float (*from)[3], const float middle[3])
 {
 	for (int p = 0; p < PLACES; p++) {
-		int n_open = ALONG_SADDLE;
-		uint8_t is_stopped[ALONG_SADDLE] = { 0 };
+		uint8_t open[ALONG_SADDLE];
+		int n_open = open_all(open, ALONG_SADDLE);
 		float place[3], seen[3];
 
 		place_of(place, cell, middle, p);
 		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
 			rectangle_sees(seen, &nearby->near[i].lid->rectangle, place);
-			n_open = stop_rays(is_stopped, n_open, ALONG_SADDLE, nearby->near[i].lid, seen, from, GRAZED * s->behind);
+			n_open = stop_rays(open, n_open, nearby->near[i].lid, place, seen, from, GRAZED * s->behind);
 		}
 		if (n_open > 0)
 			return 0;
@@ -236,7 +265,7 @@ static int is_sealed_along(const struct sealing *s, struct nearby *nearby, const
 	return stops_along(s, nearby, cell, (const float (*)[3])from, middle);
 }
 
-/* Those that are over the cell stop most: others are asked only where these do not. */
+/* Lids over the cell stop most: all that are near enough are asked only where these do not. */
 int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
 {
 	const struct dpoint_cell *cell = &s->surface->cell[at];
@@ -255,12 +284,22 @@ int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at)
 		return 0;
 	if (s->over != NULL && s->over[at] != UINT32_MAX && stops_all(s, &s->lid[s->over[at]], cell, middle, from[0][0]))
 		return 1;
-	for (int is_all = 0; is_all < 2; is_all++) {
-		nearby->n = 0;
-		nearby_gather(nearby, s, 0, middle, radius + (is_all ? 2 * s->behind : 0));
-		put_first(nearby, middle);
-		if (stops_rays(s, nearby, cell, (const float (*)[DIRECTIONS][3])from, middle))
-			return 1;
+	nearby->n = 0;
+	nearby_gather(nearby, s, 0, middle, radius);
+	const size_t n_over = nearby->n;
+	put_first(lids_of(nearby, 0, n_over), middle);
+	for (int p = 0; p < PLACES; p++) {
+		float place[3];
+
+		place_of(place, cell, middle, p);
+		if (stops_rays(s, lids_of(nearby, 0, n_over), cell, (const float (*)[DIRECTIONS][3])from, place))
+			continue;
+		if (nearby->n == n_over) {
+			nearby_gather(nearby, s, 0, middle, radius + 2 * s->behind);
+			put_first(lids_of(nearby, n_over, nearby->n), middle);
+		}
+		if (!stops_rays(s, lids_of(nearby, n_over, nearby->n), cell, (const float (*)[DIRECTIONS][3])from, place))
+			return 0;
 	}
-	return 0;
+	return 1;
 }

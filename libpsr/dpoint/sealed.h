@@ -12,6 +12,7 @@
 struct near_lid {
 	const struct lid *lid;
 	float place[3]; /* that is looked at, in the lid's frame */
+	int is_over;    /* the place is within its sides */
 };
 
 struct nearby {
