@@ -55,12 +55,6 @@ static int is_mapped(const struct psr_mesh *mesh, const struct psr_material *mat
 	return normal_is_mapped(material);
 }
 
-static int shines(const struct psr_mesh *mesh, const struct psr_material *material)
-{
-	(void)mesh;
-	return material->unlit || material->emissive[0] > 0 || material->emissive[1] > 0 || material->emissive[2] > 0;
-}
-
 /* Counts the triangles of such materials; 0 without memory: it is but a note. */
 static uint32_t count_triangles(const struct psr_mesh *mesh,
                                 int (*is_such)(const struct psr_mesh *mesh, const struct psr_material *material))
@@ -75,27 +69,26 @@ static uint32_t count_triangles(const struct psr_mesh *mesh,
 	return n;
 }
 
-/* Notes how many triangles are such, if any. */
-static void note(const struct psr_mesh *mesh,
-                 int (*is_such)(const struct psr_mesh *mesh, const struct psr_material *material), const char *what)
+static void note_sheer(const struct psr_mesh *mesh, const char *kind)
 {
-	const uint32_t n = count_triangles(mesh, is_such);
+	const uint32_t n = count_triangles(mesh, is_sheer);
 
 	if (n > 0)
-		fprintf(stderr, NOTE "%" PRIu32 " of %" PRIu32 " triangles %s\n", n, mesh->n_triangles, what);
+		fprintf(stderr, NOTE "%" PRIu32 " of %" PRIu32 " triangles are of surfaces that let light through (BLEND materials);"
+		        " %s are opaque, see through them with --representation blocks\n", n, mesh->n_triangles, kind);
 }
 
 void notes_of_octree(const struct psr_mesh *mesh)
 {
-	note(mesh, is_sheer, "are of surfaces that let light through (BLEND materials); octrees are opaque, see through them with"
-	     " --representation blocks");
-	note(mesh, shines, "shine by themselves or are unlit; octrees light them as they do others, blocks and differential"
-	     " points do not");
+	note_sheer(mesh, "octrees");
 }
 
 void notes_of_points(const struct psr_mesh *mesh)
 {
-	note(mesh, is_sheer, "are of surfaces that let light through (BLEND materials); differential points are opaque, see"
-	     " through them with --representation blocks");
-	note(mesh, is_mapped, "have normal maps, which differential points do not show; blocks and octrees do");
+	const uint32_t n = count_triangles(mesh, is_mapped);
+
+	note_sheer(mesh, "differential points");
+	if (n > 0)
+		fprintf(stderr, NOTE "%" PRIu32 " of %" PRIu32 " triangles have normal maps, which differential points do not show;"
+		        " blocks and octrees do\n", n, mesh->n_triangles);
 }

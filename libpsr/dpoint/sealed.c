@@ -76,7 +76,7 @@ struct lids {
 
 static struct lids lids_of(const struct nearby *nearby, size_t begin, size_t end)
 {
-	return (struct lids){ nearby->near + begin, end - begin };
+	return (struct lids){ begin > 0 ? nearby->near + begin : nearby->near, end - begin };
 }
 
 static void see_place(struct lids lids, const float at[3])

@@ -154,9 +154,12 @@ static inline uint32_t psr_cubes_rank(const struct octree *tree, uint32_t code, 
 /* Builds a leaf's attributes in the form of a block's sample. Without a normal it is unlit. */
 static inline uint64_t psr_cubes_attr(const struct octree *tree, uint32_t leaf)
 {
-	uint64_t attr = tree->normal != NULL ? tree->normal[leaf] | (uint64_t)octree_material(tree, leaf) << 40 : 1u << 15;
+	const uint32_t material = tree->normal != NULL ? octree_material(tree, leaf) : OCTREE_UNLIT;
+	uint64_t attr = material != OCTREE_UNLIT ? (uint64_t)material << 40 : 1u << 15;
 	const uint8_t *color = tree->color != NULL ? tree->color[leaf] : NULL;
 
+	if (tree->normal != NULL)
+		attr |= tree->normal[leaf];
 	attr |= color != NULL ? (uint64_t)color[0] << 16 | (uint64_t)color[1] << 24 | (uint64_t)color[2] << 32
 	                      : CUBES_GRAY << 16;
 	return attr;

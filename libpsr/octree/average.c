@@ -97,28 +97,35 @@ static void add_material(struct material_sums *sums, uint32_t material)
 	sums->plain_width2 += width2;
 }
 
+/* Unlit children count where they are more than half, and alone; else the others do. */
 uint32_t octree_mean_material(const struct octree *tree, uint64_t first, unsigned n)
 {
-	const uint32_t one = octree_material(tree, first);
 	struct material_sums sums = { 0 };
-	uint32_t differ = 0;
+	uint32_t one = OCTREE_UNLIT, differ = 0;
+	unsigned n_lit = 0;
 	double length;
 
 	for (unsigned i = 0; i < n; i++) {
 		const uint32_t material = octree_material(tree, first + i);
 
+		if (material == OCTREE_UNLIT)
+			continue;
+		if (n_lit++ == 0)
+			one = material;
 		differ |= material ^ one;
 		add_material(&sums, material);
 	}
+	if (2 * n_lit < n)
+		return OCTREE_UNLIT;
 	length = tree->normal != NULL && sums.mirrored > 0.0 ? mean_length(tree->normal + first, n) : 1.0;
 	if (differ == 0 && !(length < 1.0))
 		return one;
-	double width2 = sums.mirrored > 0.0 ? sums.width2 / sums.mirrored : sums.plain_width2 / n;
+	double width2 = sums.mirrored > 0.0 ? sums.width2 / sums.mirrored : sums.plain_width2 / n_lit;
 	if (length < 1.0)
 		width2 += 2.0 * (1.0 - length) / length; /* NaN and infinity: 1 */
 	const double roughness = width2 < 1.0 ? sqrt(sqrt(width2)) : 1.0;
 	const double root = sums.rest > 0 ? sqrt((double)sums.reflected / sums.rest) : (double)(one >> 5 & 31);
-	return (sums.metallic + n / 2) / n | (uint32_t)(root + 0.5) << 5 | (sums.shut + n / 2) / n << 10
+	return (sums.metallic + n_lit / 2) / n_lit | (uint32_t)(root + 0.5) << 5 | (sums.shut + n_lit / 2) / n_lit << 10
 	       | (uint32_t)(roughness * ROUGH + 0.5) << 16;
 }
 

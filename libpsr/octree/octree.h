@@ -14,6 +14,7 @@
 #define OCTREE_SKIP_LEVELS 6 /* from a node of the skip index to its leaves: some 4,000 leaves of a surface */
 #define OCTREE_OFFSETS 4     /* steps of a leaf's offset */
 #define OCTREE_MATTE 0xff0000u /* the material of leaves that have none: rough, open, mirrors nothing */
+#define OCTREE_UNLIT 0x0003e0u /* of leaves that are drawn in their colour: no sample has such a reflectance */
 
 /* Where the subtree of a node OCTREE_SKIP_LEVELS above the leaves begins; the root's in a tree of fewer levels. */
 struct octree_skip {
@@ -115,7 +116,7 @@ static inline uint32_t octree_get_material(const uint8_t at[3])
 	return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
 }
 
-/* Returns a leaf's material, bits 40 to 63 of a sample's attributes. */
+/* Returns a leaf's material, bits 40 to 63 of a sample's attributes, or OCTREE_UNLIT. */
 static inline uint32_t octree_material(const struct octree *tree, uint64_t leaf)
 {
 	const uint8_t *one = tree->one_material != NULL ? *tree->one_material : NULL;

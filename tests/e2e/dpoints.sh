@@ -142,7 +142,7 @@ looks() { # material...: a triangle of each
 			"material": %d } ] },' $i; done | sed '$s/,$//')" "$(printf '%s,' "$@" | sed 's/,$//')" $map $positions
 }
 glass='{ "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorFactor": [ 1, 1, 1, 0.5 ] } }'
-paint='{ "alphaMode": "BLEND" }' bumps='{ "normalTexture": { "index": 0 } }' shine='{ "emissiveFactor": [ 1, 1, 1 ] }'
+paint='{ "alphaMode": "BLEND" }' bumps='{ "normalTexture": { "index": 0 } }'
 looks "$glass" "$paint" "$bumps" "$bumps" >"$work/looks.gltf"
 looks "$paint" >"$work/paint.gltf"
 build_looks() { psr-model build "$work/looks.gltf" --representation "$1" -r 32 -o "$work/looks.psr" 2>"$work/said" >/dev/null; }
@@ -152,12 +152,6 @@ for kind in octree both dpoints; do
 	check "$kind of glass: what is drawn opaque is counted" grep -q 'note: 1 of 4 triangles are of surfaces that let light' "$work/said"
 done
 check "so are normal maps that are not drawn" grep -q 'note: 2 of 4 triangles have normal maps' "$work/said"
-looks "$paint" "$shine" >"$work/shine.gltf"
-psr-model build "$work/shine.gltf" --representation octree -r 32 -o "$work/looks.psr" 2>"$work/said" >/dev/null
-check "octrees light what shines, and say so" grep -q 'note: 1 of 2 triangles shine by themselves or are unlit' "$work/said"
-check "and no more" has_notes 1
-psr-model build "$work/shine.gltf" --representation dpoints -r 32 -o "$work/looks.psr" 2>"$work/said" >/dev/null
-check "differential points do not" has_notes 0
 check "blocks draw them all" build_looks blocks
 check "and say of glass what they do" grep -q 'blocks are of surfaces that let light through' "$work/said"
 check "no more" has_notes 1

@@ -85,8 +85,6 @@ static void look_at(const struct leaf_maker *m, struct facet *facet)
 	find_place(&place, facet, facet->middle);
 	word = surface_look(&m->look, &place, DIAGONAL, facet->normal);
 	material_decode(&facet->look, word);
-	if (facet->look.unlit)
-		facet->look.roughness = 1; /* leaves are lit */
 	for (int c = 0; c < 3; c++)
 		facet->normal[c] = m->is_turned[facet->triangle] ? -facet->normal[c] : facet->normal[c];
 }
@@ -233,19 +231,32 @@ static void set_plane(struct leaf_maker *m, uint64_t path, uint64_t leaf)
 	lean_add(&m->lean, path, own, m->facet, m->n_facets);
 }
 
+/* Whether more of the leaf's surface is unlit than lit: only that counts then, as in blends (surface/blend.h). */
+static int is_mostly_unlit(const struct leaf_maker *m)
+{
+	double area[2] = { 0.0, 0.0 };
+
+	for (size_t i = 0; i < m->n_facets; i++)
+		area[m->facet[i].look.unlit] += m->facet[i].area;
+	return area[1] > area[0];
+}
+
 /* The mean normal of two faces is nearest to both of them, but a mirror with it shows what neither of them does. */
 static void set_leaf(struct leaf_maker *m, uint64_t path, uint64_t leaf)
 {
 	struct octree *tree = m->maker.tree;
 	struct look_sums sums = { 0 };
+	int is_unlit;
 
 	m->report.n_both += (uint64_t)facets_keep_side(m->facet, &m->n_facets);
+	is_unlit = is_mostly_unlit(m);
 	for (size_t i = 0; i < m->n_facets; i++)
-		add_look(&sums, &m->facet[i].look, m->facet[i].area);
+		if (m->facet[i].look.unlit == is_unlit)
+			add_look(&sums, &m->facet[i].look, m->facet[i].area);
 	for (int c = 0; c < 3; c++)
 		tree->color[leaf][c] = psr_linear_to_srgb((float)(sums.color[c] / sums.area));
-	octree_put_material(tree->material[leaf], material_of(&sums));
-	if (shines(&sums))
+	octree_put_material(tree->material[leaf], is_unlit ? OCTREE_UNLIT : material_of(&sums));
+	if (!is_unlit && shines(&sums))
 		for (int face = 1; face < FACES && facets_keep_face(m->facet, &m->n_facets); face++)
 			;
 	set_plane(m, path, leaf);

@@ -254,6 +254,11 @@ static void means_of_materials_keep_what_is_mirrored(void **state)
 	assert_true(roughness > 0.55 && roughness < 0.595);
 	bare.one_material = NULL;
 	assert_int_equal(octree_mean_material(&bare, 0, 2), OCTREE_MATTE);
+	/* Unlit children count where they are more than half, and others alone where not. */
+	assert_int_equal(mean_of((const uint32_t[3]){ OCTREE_UNLIT, material(9, 6, 3, 99), OCTREE_UNLIT }, 3, same),
+	                 OCTREE_UNLIT);
+	assert_int_equal(mean_of((const uint32_t[4]){ OCTREE_UNLIT, material(0, 6, 2, 99), material(0, 6, 4, 99), OCTREE_UNLIT }, 4,
+	                         NULL), material(0, 6, 3, 99));
 }
 
 /* Which octree_mean_normal() takes for granted where all children have one. */

@@ -10,6 +10,7 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "meshes.h"
+#include "model/cubes.h"
 #include "sample/octree/of_mesh.h"
 #include "surface/material.h"
 
@@ -438,6 +439,48 @@ static void leaves_have_the_material_of_their_surface(void **state)
 	meshes_free(mesh);
 }
 
+/* A square of two materials, of which the second is as bright whatever the light: leaves are of one or the other. */
+static void leaves_of_what_is_unlit_are_unlit(void **state)
+{
+	struct psr_mesh *mesh = meshes_square(2);
+	struct psr_material *two = calloc(2, sizeof *two);
+	uint64_t n[2] = { 0 };
+	struct octree *tree;
+
+	(void)state;
+	for (int i = 0; i < 2; i++)
+		memcpy(&two[i], mesh->material, sizeof *two);
+	two[1].emissive[0] = 1;
+	two[1].base_color[0] = two[1].base_color[1] = two[1].base_color[2] = 0;
+	two[0].base_color[0] = 0;
+	free(mesh->material);
+	mesh->material = two;
+	mesh->n_materials = 2;
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		mesh->triangle_material[t] = t % 2;
+	tree = tree_of(mesh);
+	for (uint32_t i = 0; i < tree->n_leaves; i++) {
+		const uint64_t attr = psr_cubes_attr(tree, i);
+		const int is_unlit = octree_material(tree, i) == OCTREE_UNLIT;
+
+		n[is_unlit]++;
+		assert_int_equal(PSR_ATTR_UNLIT(attr), is_unlit);
+		assert_int_equal(PSR_ATTR_NORMAL(attr), tree->normal[i]);
+		assert_int_equal(PSR_ATTR_BASE(attr), is_unlit ? 0x0000ff : 0xffff00);
+		assert_true(!is_unlit || attr >> 40 == 0);
+	}
+	assert_true(n[0] > tree->n_leaves / 3 && n[1] > tree->n_leaves / 3);
+	octree_destroy(tree);
+	/* All of them have it once. */
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		mesh->triangle_material[t] = 1;
+	tree = tree_of(mesh);
+	assert_null(tree->material);
+	assert_int_equal(octree_material(tree, 9), OCTREE_UNLIT);
+	octree_destroy(tree);
+	meshes_free(mesh);
+}
+
 /* The normal is of a face to half a step of its code, where the mean of two faces would be 45 degrees off both. */
 static void look_at_face(const struct point *p, void *userdata)
 {
@@ -626,6 +669,7 @@ int main(void)
 		cmocka_unit_test(textures_finer_than_leaves_are_filtered),
 		cmocka_unit_test(colors_of_vertices_are_those_of_the_middle),
 		cmocka_unit_test(leaves_have_the_material_of_their_surface),
+		cmocka_unit_test(leaves_of_what_is_unlit_are_unlit),
 		cmocka_unit_test(leaves_that_shine_are_of_one_face),
 		cmocka_unit_test(transparent_places_have_no_leaves),
 		cmocka_unit_test(both_sides_of_a_thin_sheet_are_counted),
