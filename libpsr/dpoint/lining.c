@@ -18,30 +18,14 @@ static float back_of(const struct dpoint_cover_options *options)
 	return options->error > 0 ? fminf(back, 0.5f * options->error) : back;
 }
 
-/* Stops those of the open rays to the place `at` that the lid is in the way of. Returns how many are left. */
-static int stop_grazing(uint8_t *is_stopped, int n_open, const struct lid *lid, const float at[3],
-                        const float (*from)[3])
-{
-	float away[3], seen[3];
-
-	v3f_sub(away, at, lid->rectangle.at);
-	rectangle_sees(seen, &lid->rectangle, at);
-	for (int d = 0; d < AROUND_GRAZING; d++)
-		if (!is_stopped[d] && lid_may_stop(lid, away, from[d], 0) && lid_stops(lid, seen, from[d], 0)) {
-			is_stopped[d] = 1;
-			n_open--;
-		}
-	return n_open;
-}
-
 /* Whether lids stop all rays that graze a cell's plane on their way to a place behind its middle. */
 static int is_lined(const struct sealing *s, struct nearby *nearby, uint32_t at)
 {
 	const struct dpoint_cell *cell = &s->surface->cell[at];
 	const float deep = DEEP * s->options->height, sine = sqrtf(1 - GRAZING * GRAZING);
 	float from[AROUND_GRAZING][3], axis[3][3], place[3];
-	uint8_t is_stopped[AROUND_GRAZING] = { 0 };
-	int n_open = AROUND_GRAZING;
+	uint8_t open[AROUND_GRAZING];
+	int n_open = rays_open(open, AROUND_GRAZING);
 
 	cell_plane(axis[2], cell);
 	if (v3f_dot(axis[2], axis[2]) == 0)
@@ -56,8 +40,13 @@ static int is_lined(const struct sealing *s, struct nearby *nearby, uint32_t at)
 	v3f_add_scaled(place, place, -deep, axis[2]);
 	nearby->n = 0;
 	nearby_gather(nearby, s, 0, place, 1.2f * deep / GRAZING);
-	for (size_t i = 0; i < nearby->n && n_open > 0; i++)
-		n_open = stop_grazing(is_stopped, n_open, nearby->near[i].lid, place, (const float (*)[3])from);
+	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+		const struct lid *lid = nearby->near[i].lid;
+		float seen[3];
+
+		rectangle_sees(seen, &lid->rectangle, place);
+		n_open = rays_stop(open, n_open, lid, place, seen, (const float (*)[3])from, 0);
+	}
 	return n_open == 0;
 }
 

@@ -42,10 +42,8 @@ void nearby_gather(struct nearby *nearby, const struct sealing *s, size_t i, con
 	nearby->near[nearby->n++].lid = &s->lid[s->tree.order[node->begin]];
 }
 
-/* Leaves out those of the open rays to a place that the lid stops: `open` has their directions, one after the other; p is
- * the place in the lid's frame. Returns how many are left. */
-static int stop_rays(uint8_t *open, int n_open, const struct lid *lid, const float at[3], const float p[3],
-                     const float (*from)[3], float behind)
+int rays_stop(uint8_t *open, int n_open, const struct lid *lid, const float at[3], const float p[3],
+              const float (*from)[3], float behind)
 {
 	float away[3];
 	int n = 0;
@@ -61,7 +59,7 @@ static int stop_rays(uint8_t *open, int n_open, const struct lid *lid, const flo
 	return n;
 }
 
-static int open_all(uint8_t *open, int n)
+int rays_open(uint8_t *open, int n)
 {
 	for (int d = 0; d < n; d++)
 		open[d] = (uint8_t)d;
@@ -95,7 +93,7 @@ static int is_sealed_at(const struct sealing *s, struct lids lids, const float a
                         const float (*from)[3], const float normal[3], int n)
 {
 	uint8_t open[DIRECTIONS];
-	int n_open = open_all(open, n);
+	int n_open = rays_open(open, n);
 
 	for (size_t i = 0; i < lids.n; i++)
 		if (lids.near[i].is_over && lid_stops_all(lids.near[i].lid, lids.near[i].place, normal,
@@ -106,7 +104,7 @@ static int is_sealed_at(const struct sealing *s, struct lids lids, const float a
 			const struct near_lid *near = &lids.near[i];
 
 			if (near->is_over == is_over)
-				n_open = stop_rays(open, n_open, near->lid, at, near->place, from, s->behind);
+				n_open = rays_stop(open, n_open, near->lid, at, near->place, from, s->behind);
 		}
 	return n_open == 0;
 }
@@ -228,13 +226,13 @@ static int stops_along(const struct sealing *s, const struct nearby *nearby, con
 {
 	for (int p = 0; p < PLACES; p++) {
 		uint8_t open[ALONG_SADDLE];
-		int n_open = open_all(open, ALONG_SADDLE);
+		int n_open = rays_open(open, ALONG_SADDLE);
 		float place[3], seen[3];
 
 		place_of(place, cell, middle, p);
 		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
 			rectangle_sees(seen, &nearby->near[i].lid->rectangle, place);
-			n_open = stop_rays(open, n_open, nearby->near[i].lid, place, seen, from, GRAZED * s->behind);
+			n_open = rays_stop(open, n_open, nearby->near[i].lid, place, seen, from, GRAZED * s->behind);
 		}
 		if (n_open > 0)
 			return 0;

@@ -43,6 +43,14 @@ int sealing_look(struct sealing *s, const struct dpoint_choice *choice, const st
 /* Adds the lids, of the tree's node i and below, whose balls meet the ball around a place. */
 void nearby_gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius);
 
+/* Lists n rays to a place, all of them open, by their directions. Returns n. */
+int rays_open(uint8_t *open, int n);
+
+/* Leaves out those of the open rays to the place `at` that the lid stops, `behind` after it at most; grazing ones of
+ * is_sealed() some more. p: the place in the lid's frame. Returns how many are left. */
+int rays_stop(uint8_t *open, int n_open, const struct lid *lid, const float at[3], const float p[3],
+              const float (*from)[3], float behind);
+
 /* Whether the lids stop all rays that are looked at to a cell (seal.h). */
 int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at);
 
