@@ -22,20 +22,14 @@ static float back_of(const struct dpoint_cover_options *options)
 static int is_lined(const struct sealing *s, struct nearby *nearby, uint32_t at)
 {
 	const struct dpoint_cell *cell = &s->surface->cell[at];
-	const float deep = DEEP * s->options->height, sine = sqrtf(1 - GRAZING * GRAZING);
+	const float deep = DEEP * s->options->height;
 	float from[AROUND_GRAZING][3], axis[3][3], place[3];
 	uint8_t open[AROUND_GRAZING];
 	int n_open = rays_open(open, AROUND_GRAZING);
 
-	cell_plane(axis[2], cell);
-	if (v3f_dot(axis[2], axis[2]) == 0)
+	if (!rays_axis(axis, cell))
 		return 1;
-	dpoint_tangents(axis[0], axis[1], axis[2]);
-	for (int d = 0; d < AROUND_GRAZING; d++) {
-		v3f_scale(from[d], axis[2], GRAZING);
-		v3f_add_scaled(from[d], from[d], sine * s->around[d][0], axis[0]);
-		v3f_add_scaled(from[d], from[d], sine * s->around[d][1], axis[1]);
-	}
+	rays_graze(from, s, (const float (*)[3])axis);
 	dpoint_cell_middle(place, cell);
 	v3f_add_scaled(place, place, -deep, axis[2]);
 	nearby->n = 0;
@@ -173,11 +167,24 @@ static int put_lining(struct dpoint_surface *surface, const uint8_t *is_open,
 	return rc;
 }
 
+/* A lining covers cells, whatever they look like, though it lies behind them and they lean from it. */
+static int keep_lining(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
+                       const struct dpoint_cover_options *options, const struct dpoint_work *work)
+{
+	const size_t before = cover->n_candidates;
+	struct dpoint_cover_options lined = *options;
+	int rc;
+
+	lined.looks = 255;
+	lined.angle = LEAN;
+	lined.height = OFF * options->height;
+	rc = cover_candidates(cover, surface, &lined, work);
+	return rc == PSR_OK ? keep_added(choice, before, surface->n_candidates) : rc;
+}
+
 int line_slits(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
                const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
-	struct dpoint_cover_options lined = *options;
-	const size_t before = surface->n_candidates;
 	struct sealing s;
 	int rc = PSR_OK;
 
@@ -188,18 +195,12 @@ int line_slits(struct dpoint_surface *surface, struct dpoint_choice *choice, str
 	s.is_open = malloc(surface->n_cells);
 	if (s.is_open == NULL)
 		return PSR_ERR_MEMORY;
-	if (find_slits(s.is_open, surface, options) > 0) {
+	if (find_slits(s.is_open, surface, options) > 0)
 		rc = sealing_look(&s, choice, work);
-		if (rc == PSR_OK && memchr(s.is_open, 1, surface->n_cells) != NULL)
-			rc = put_lining(surface, s.is_open, options, work);
+	if (rc == PSR_OK && memchr(s.is_open, 1, surface->n_cells) != NULL) {
+		rc = put_lining(surface, s.is_open, options, work);
+		rc = rc == PSR_OK ? keep_lining(surface, choice, cover, options, work) : rc;
 	}
-	lined.looks = 255;
-	lined.angle = LEAN;
-	lined.height = OFF * options->height;
-	if (rc == PSR_OK && surface->n_candidates > before)
-		rc = cover_candidates(cover, surface, &lined, work);
-	if (rc == PSR_OK)
-		rc = keep_added(choice, before, surface->n_candidates);
 	free(s.is_open);
 	return rc;
 }

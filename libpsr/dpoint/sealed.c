@@ -77,15 +77,14 @@ static struct lids lids_of(const struct nearby *nearby, size_t begin, size_t end
 	return (struct lids){ begin > 0 ? nearby->near + begin : nearby->near, end - begin };
 }
 
-static void see_place(struct lids lids, const float at[3])
+/* Returns whether the place is within the lid's sides. */
+static int see(struct near_lid *near, const float at[3])
 {
-	for (size_t i = 0; i < lids.n; i++) {
-		struct near_lid *near = &lids.near[i];
-		const float *extent = near->lid->rectangle.extent;
+	const float *extent = near->lid->rectangle.extent;
 
-		rectangle_sees(near->place, &near->lid->rectangle, at);
-		near->is_over = fabsf(near->place[0]) <= extent[0] && fabsf(near->place[1]) <= extent[1];
-	}
+	rectangle_sees(near->place, &near->lid->rectangle, at);
+	near->is_over = fabsf(near->place[0]) <= extent[0] && fabsf(near->place[1]) <= extent[1];
+	return near->is_over;
 }
 
 /* Lids over the place come first: they stop most rays. */
@@ -109,24 +108,42 @@ static int is_sealed_at(const struct sealing *s, struct lids lids, const float a
 	return n_open == 0;
 }
 
+/* A ray at an angle to a plane, as its cosine to the plane's normal; turn: around that. */
+static void ray_of(float from[3], const float axis[3][3], float cosine, const float turn[2])
+{
+	const float sine = sqrtf(1 - cosine * cosine);
+
+	v3f_scale(from, axis[2], cosine);
+	v3f_add_scaled(from, from, sine * turn[0], axis[0]);
+	v3f_add_scaled(from, from, sine * turn[1], axis[1]);
+}
+
+void rays_graze(float (*from)[3], const struct sealing *s, const float axis[3][3])
+{
+	for (int d = 0; d < AROUND_GRAZING; d++)
+		ray_of(from[d], axis, GRAZING, s->around[d]);
+}
+
+int rays_axis(float axis[3][3], const struct dpoint_cell *cell)
+{
+	cell_plane(axis[2], cell);
+	if (axis[2][0] == 0 && axis[2][1] == 0 && axis[2][2] == 0)
+		return 0;
+	dpoint_tangents(axis[0], axis[1], axis[2]);
+	return 1;
+}
+
 /* Where rays to a cell come from: its plane's normal, and around it. Returns 0 of a cell without an area. */
 static int directions(float (*from)[3], const struct sealing *s, const struct dpoint_cell *cell)
 {
-	float x[3], y[3], normal[3];
+	float axis[3][3];
 
-	cell_plane(normal, cell);
-	if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
+	if (!rays_axis(axis, cell))
 		return 0;
-	dpoint_tangents(x, y, normal);
-	memcpy(from[0], normal, sizeof from[0]);
-	for (int d = 1; d < DIRECTIONS; d++) {
-		const float cosine = d >= STEEP ? GRAZING : slant[(d - 1) / AROUND], sine = sqrtf(1 - cosine * cosine);
-		const float *turn = s->around[d >= STEEP ? d - STEEP : 2 * ((d - 1) % AROUND) + 1];
-
-		v3f_scale(from[d], normal, cosine);
-		v3f_add_scaled(from[d], from[d], sine * turn[0], x);
-		v3f_add_scaled(from[d], from[d], sine * turn[1], y);
-	}
+	memcpy(from[0], axis[2], sizeof from[0]);
+	for (int d = 1; d < STEEP; d++)
+		ray_of(from[d], (const float (*)[3])axis, slant[(d - 1) / AROUND], s->around[2 * ((d - 1) % AROUND) + 1]);
+	rays_graze(from + STEEP, s, (const float (*)[3])axis);
 	return 1;
 }
 
@@ -136,12 +153,9 @@ static void put_first(struct lids lids, const float at[3])
 	size_t n = 0;
 
 	for (size_t i = 0; i < lids.n; i++) {
-		const struct near_lid near = lids.near[i];
-		const struct rectangle *r = &near.lid->rectangle;
-		float p[3];
+		struct near_lid near = lids.near[i];
 
-		rectangle_sees(p, r, at);
-		if (fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]) {
+		if (see(&near, at)) {
 			lids.near[i] = lids.near[n];
 			lids.near[n++] = near;
 		}
@@ -180,7 +194,8 @@ static int stops_rays(const struct sealing *s, struct lids lids, const struct dp
 {
 	const int n_sides = 1 + dpoint_is_two_sided(s->options, cell->part);
 
-	see_place(lids, place);
+	for (size_t i = 0; i < lids.n; i++)
+		see(&lids.near[i], place);
 	for (int side = 0; side < n_sides; side++)
 		if (!is_sealed_at(s, lids, place, from[side], from[side][0], n_sides == 1 ? STEEP : DIRECTIONS))
 			return 0;

@@ -43,6 +43,12 @@ int sealing_look(struct sealing *s, const struct dpoint_choice *choice, const st
 /* Adds the lids, of the tree's node i and below, whose balls meet the ball around a place. */
 void nearby_gather(struct nearby *nearby, const struct sealing *s, size_t i, const float middle[3], float radius);
 
+/* The axes of a cell's plane, its normal last. Returns 0 of a cell without an area. */
+int rays_axis(float axis[3][3], const struct dpoint_cell *cell);
+
+/* Where AROUND_GRAZING rays come from that graze a plane. */
+void rays_graze(float (*from)[3], const struct sealing *s, const float axis[3][3]);
+
 /* Lists n rays to a place, all of them open, by their directions. Returns n. */
 int rays_open(uint8_t *open, int n);
 
