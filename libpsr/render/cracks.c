@@ -11,11 +11,6 @@ struct crack {
 	float farthest;   /* of their depths */
 };
 
-static float depth_of(uint64_t word)
-{
-	return psr_float_from_bits((uint32_t)(word >> 32));
-}
-
 static int has(const struct crack *c, uint32_t x, uint32_t y)
 {
 	for (int k = 0; k < c->n; k++)
@@ -51,7 +46,7 @@ static int look_around(struct crack *c, const struct plan *plan, const struct ps
 	for (uint32_t v = y - 1; v <= y + 1; v++)
 		for (uint32_t u = x - 1; u <= x + 1; u++) {
 			const uint64_t word = psr_zstack_row(stack, v)[u];
-			const float z = depth_of(word);
+			const float z = psr_word_z(word);
 
 			if (z <= c->limit && z * plan->gap_scale[1] + plan->gap_offset[1] < c->own) {
 				c->nearest = word < c->nearest ? word : c->nearest;
@@ -72,7 +67,7 @@ static float depth_beside(const struct crack *c, const struct psr_zstack *stack,
 		x += (uint32_t)dx;
 		y += (uint32_t)dy;
 	}
-	return depth_of(psr_zstack_row(stack, y)[x]);
+	return psr_word_z(psr_zstack_row(stack, y)[x]);
 }
 
 static int goes_on(const struct crack *c, const struct psr_zstack *stack, int k, float most)
@@ -110,7 +105,7 @@ static int is_in(const struct plan *plan, const struct psr_zstack *stack, const 
 	for (int k = 0; k < c.n; k++)
 		if (!look_around(&c, plan, stack, k))
 			return 0;
-	if (c.n > most || c.nearest == UINT64_MAX || c.farthest - depth_of(c.nearest) > apart)
+	if (c.n > most || c.nearest == UINT64_MAX || c.farthest - psr_word_z(c.nearest) > apart)
 		return 0;
 	for (int k = 0; k < c.n; k++)
 		if (!goes_on(&c, stack, k, step))
@@ -134,8 +129,8 @@ int is_in_crack(const struct plan *plan, const struct psr_zstack *stack, uint32_
 	if (plan->warp[instance].points == NULL)
 		return 0;
 	spacing = plan->instance[instance].level_spacing;
-	c.own = depth_of(psr_zstack_row(stack, y)[x]);
-	c.limit = depth_of(near);
+	c.own = psr_word_z(psr_zstack_row(stack, y)[x]);
+	c.limit = psr_word_z(near);
 	return is_in(plan, stack, &c, CRACK_MOST, CRACK_APART / 4 * spacing, CRACK_STEP * spacing)
 	       || is_in(plan, stack, &c, CRACK_SHORT, CRACK_APART / 2 * spacing, CRACK_STEP * spacing)
 	       || is_in(plan, stack, &c, 1, CRACK_APART * spacing, CRACK_STEP_ALONE * spacing);

@@ -49,7 +49,7 @@ static float own_depth(const struct fill *fill, int32_t column, int32_t row)
 	if (is_marked(fill, x, y))
 		return fill_own_row(fill, y)[x];
 	word = psr_zstack_row(fill->picture.stack, y)[x];
-	return word == PSR_WORD_EMPTY ? NAN : psr_float_from_bits((uint32_t)(word >> 32));
+	return word == PSR_WORD_EMPTY ? NAN : psr_word_z(word);
 }
 
 /* Looks at a pixel dx and dy aside that shows a sample of depth z. */

@@ -112,7 +112,7 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t firs
 	const struct plan_instance *in = &plan->instance[n];
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot, opacity = b->opacity[pixels->at[i] - b->attr];
-	const float z = psr_float_from_bits((uint32_t)(l->word[at] >> 32)), back = (float)opacity * (1.0f / PSR_OPAQUE);
+	const float z = psr_word_z(l->word[at]), back = (float)opacity * (1.0f / PSR_OPAQUE);
 	const float share = l->through[at] * back;
 
 	for (int c = 0; c < 3; c++)
@@ -142,7 +142,7 @@ static void find_layer(struct sheer_tile *l, const struct plan *plan, const stru
 	for (uint32_t i = 0; i < list->n && !plan_is_cancelled_at(plan, i); i++) {
 		const struct sheer_word w = list->word[i];
 
-		const int is_beyond = psr_float_from_bits((uint32_t)(w.word >> 32)) > beyond[w.at];
+		const int is_beyond = psr_word_z(w.word) > beyond[w.at];
 		const uint64_t word = is_beyond ? w.word : PSR_WORD_EMPTY;
 
 		nearest[w.at] = word < nearest[w.at] ? word : nearest[w.at];
@@ -152,29 +152,24 @@ static void find_layer(struct sheer_tile *l, const struct plan *plan, const stru
 	list->n = n;
 }
 
-static float z_of(uint64_t word)
-{
-	return psr_float_from_bits((uint32_t)(word >> 32));
-}
-
 /* Closes pixel `at` if the layer goes on beside it at both of two places, as deep to less than its thickness, and lacks
  * it: there is nothing, or what lies further behind. */
 static int close_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, const uint64_t beside[2])
 {
-	const float z[2] = { z_of(beside[0]), z_of(beside[1]) }, middle = 0.5f * (z[0] + z[1]);
+	const float z[2] = { psr_word_z(beside[0]), psr_word_z(beside[1]) }, middle = 0.5f * (z[0] + z[1]);
 	const uint32_t slot = (uint32_t)beside[0] / PSR_BLOCK_SAMPLES, n = plan_find_instance(plan, slot);
 	const struct plan_instance *in = &plan->instance[n];
 	const float thick = LAYER_STEPS * splat_rim(in, slot - in->first_slot);
 
-	if (!(__builtin_fabsf(z[0] - z[1]) < thick && z_of(l->word[at]) - middle > 2 * thick) || middle <= l->beyond[at] ||
+	if (!(__builtin_fabsf(z[0] - z[1]) < thick && psr_word_z(l->word[at]) - middle > 2 * thick) || middle <= l->beyond[at] ||
 	    middle >= l->before[at])
 		return 0;
 	l->word[at] = (uint64_t)psr_bits_from_float(middle) << 32 | (uint32_t)beside[0];
 	return 1;
 }
 
-/* Closes single pixels that no sample of a layer met, as where two projections of a model meet. One that nothing met, with
- * layers all around, shows the farther of those beside it: there the outline of what is in front passes. */
+/* Closes single pixels that no sample of a layer met, as where two projections of a model meet. One that nothing met,
+ * with layers all around, shows the farther of those beside it: there the outline of what is in front passes. */
 static void close_layer(struct sheer_tile *l, const struct plan *plan, const struct sheer_area *area)
 {
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
@@ -190,7 +185,7 @@ static void close_layer(struct sheer_tile *l, const struct plan *plan, const str
 			if (!(word > column[0] && word > column[1]) || close_pixel(l, plan, at, column))
 				continue;
 			const uint64_t farther = row[0] > row[1] ? row[0] : row[1];
-			if (word == PSR_WORD_EMPTY && l->beyond[at] == 0 && word > farther && z_of(farther) < l->before[at])
+			if (word == PSR_WORD_EMPTY && l->beyond[at] == 0 && word > farther && psr_word_z(farther) < l->before[at])
 				l->word[at] = farther;
 		}
 }

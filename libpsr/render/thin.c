@@ -92,7 +92,7 @@ static void light_strip(struct sheer_tile *l, const struct sheer_drawing *d, con
 			l->light[c][at] = (1 - through) * sheer_light(d->plan, color[c]);
 		l->through[at] = through;
 		l->front[at] = l->word[at];
-		l->first[at] = psr_float_from_bits((uint32_t)(l->word[at] >> 32));
+		l->first[at] = psr_word_z(l->word[at]);
 	}
 }
 

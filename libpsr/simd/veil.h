@@ -31,7 +31,7 @@ typedef void veil_fn(const struct warp_target *target, const struct veil_layer *
 
 static inline void veil_add(const struct veil_layer *layer, uint32_t at, uint64_t word, uint32_t veil)
 {
-	const int is_before = psr_float_from_bits((uint32_t)(word >> 32)) < layer->before[at];
+	const int is_before = psr_word_z(word) < layer->before[at];
 	const uint64_t own = is_before ? word : PSR_WORD_EMPTY, there = layer->word[at];
 	const uint32_t sum = layer->veil[at] + (is_before ? veil : 0);
 

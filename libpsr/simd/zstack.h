@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include "base/maths.h"
 
 #define PSR_MAX_DEPTH_LEVEL 7 /* the coarsest level buffer has cells of 2^7 pixels */
 
@@ -20,6 +21,12 @@ struct psr_zstack {
 	int exponent;       /* z' here is world z' * 2^-exponent: no stage knows an absolute length */
 };
 #define PSR_WORD_EMPTY UINT64_C(0x7f800000ffffffff)
+
+/* z' of a word; of an empty one infinity. */
+static inline float psr_word_z(uint64_t word)
+{
+	return psr_float_from_bits((uint32_t)(word >> 32));
+}
 
 #define PSR_PLACE_BITS 4 /* quarters of a pixel: right, and four times those down */
 #define PSR_PLACE_NONE 16

@@ -90,7 +90,7 @@ static inline void ewa_draw_words(const struct warp_target *t, const struct ewa_
 /* Adds a leaf to a pixel unless the pixel's own is nearer by more than is one surface. */
 static inline void ewa_add(struct ewa_sum *to, uint64_t word, float z, const uint32_t value[EWA_LANES], uint32_t weight)
 {
-	const int is_same = z <= psr_float_from_bits((uint32_t)(word >> 32));
+	const int is_same = z <= psr_word_z(word);
 	const uint32_t w = weight & (0u - (uint32_t)is_same);
 
 	for (int k = 0; k < EWA_LANES; k++)
