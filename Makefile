@@ -316,7 +316,7 @@ ifeq ($(config),asan)
 $(BUILD)/libpsr/render/fill_%.c.o: CFLAGS += -O2
 endif
 # These look for what is to be seen themselves, ray by ray or place by place, for longer than -O2 takes to compile.
-$(addprefix $(BUILD)/tests/unit/,dpoint/bound.c.o dpoint/lining.c.o dpoint/seal.c.o render/fill.c.o): CFLAGS += -O2
+$(addprefix $(BUILD)/tests/unit/,dpoint/bound.c.o dpoint/lean.c.o dpoint/seal.c.o render/fill.c.o): CFLAGS += -O2
 $(BUILD)/tests/simd/forms.c.o: CFLAGS += -O3 -fno-trapping-math
 $(BUILD)/tests/unit/lib/%.o: CFLAGS += -O2 -fno-sanitize=all
 

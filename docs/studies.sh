@@ -24,7 +24,7 @@ for study; do
 	octree-prefixes) models=(-r 512 --models "${scans}pinetree,scan:terrain") ;;
 	octree-splats) models=(--models "${scans}teapot") ;;
 	dpoint-bytes) models=(--models "teapot,gavel$(ls "$fetched/fandisk.off" 2>/dev/null | sed 's/^/,/')") ;;
-	dpoint-holes) models=(--models "teapot,gavel,toybird,chair$(ls "$fetched/fandisk.off" "$fetched/bunny.obj" "$fetched/lionhead.off" "$fetched/rotor.off" 2>/dev/null | sed 's/^/,/' | tr -d '\n')") ;;
+	dpoint-holes) models=(--models "teapot,gavel,toybird,chair$(ls "$fetched/fandisk.off" "$fetched/bunny.obj" "$fetched/lionhead.off" "$fetched/rotor.off" "$fetched/helmet.off" 2>/dev/null | sed 's/^/,/' | tr -d '\n')") ;;
 	dpoint-models)
 		[ -f "$fetched/lionhead.off" ] && [ -f "$fetched/fandisk.off" ] ||
 			{ echo "lionhead.off and fandisk.off are not here: make models fetches them" >&2; continue; }

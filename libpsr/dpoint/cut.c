@@ -161,20 +161,6 @@ static int turns(const struct cutting *c, const struct piece *p)
 	return 0;
 }
 
-/* struct dpoint_cell */
-static float slit_of(const struct cutting *c, const double normal[3])
-{
-	double low = INFINITY, high = -INFINITY;
-
-	for (int i = 0; i < 3; i++) {
-		const double height = v3d_dot(c->corner[i]->at, normal);
-
-		low = fmin(low, height);
-		high = fmax(high, height);
-	}
-	return (float)(high - low);
-}
-
 /* Makes the cell and the shape in its middle. Returns 0 where that cannot be told: then the cell has no normal. */
 static int cell_of(struct dpoint_cell *cell, struct dpoint_local *local, const struct cutting *c, const struct piece *p)
 {
@@ -193,7 +179,6 @@ static int cell_of(struct dpoint_cell *cell, struct dpoint_local *local, const s
 	is_good = local_at(local, c, weight[0]);
 	for (int k = 0; k < 3 && is_good; k++)
 		cell->normal[k] = (float)local->axis[2][k];
-	cell->slit = is_good ? slit_of(c, local->axis[2]) : 0;
 	return is_good;
 }
 

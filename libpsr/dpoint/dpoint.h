@@ -39,6 +39,21 @@ struct dpoint_local {
  * is 0. */
 enum dpoint_made dpoint_make(struct dpoint *out, const struct dpoint_local *local);
 
+/* How shading's normal leans from a flat point's, where a mesh has normals of its own: its components along u and v,
+ * where that along the normal is 1, and how they grow along u and v. */
+struct dpoint_lean {
+	int16_t at[2];     /* in the middle, in 2^-12 */
+	uint16_t by[2][2]; /* of each component, along each of u and v: the upper half of a float */
+};
+
+#define DPOINT_LEAN_STEP 0x1p-12f
+#define DPOINT_MOST_LEAN_BY 0x1p20f /* in magnitude */
+
+static inline float dpoint_lean_by(uint16_t by)
+{
+	return psr_float_from_bits((uint32_t)by << 16);
+}
+
 /* ---- 16 bytes ---- */
 
 struct dpoint_word {

@@ -59,18 +59,28 @@ static uint32_t cut(float low[3], float high[3], const struct radix_entry *key, 
 	return count;
 }
 
-static uint32_t kind_of(const struct dpoint_candidate *c, const uint8_t *two_sided, int has_own)
+static int is_leaning(const struct dpoint_surface *surface, uint32_t candidate)
 {
+	return candidate >= surface->n_candidates - surface->n_lean;
+}
+
+/* Flags, and classes of deltas. */
+static uint32_t kind_of(const struct dpoint_grouping *grouping, uint32_t candidate, int has_own)
+{
+	const struct dpoint_candidate *c = &grouping->surface->candidate[candidate];
 	const uint32_t du = has_own ? DPOINT_OWN_DELTA : dpoint_delta_class(c->delta[0]);
 	const uint32_t dv = has_own ? DPOINT_OWN_DELTA : dpoint_delta_class(c->delta[1]);
+	uint32_t flags = is_leaning(grouping->surface, candidate) ? DPOINT_LEANING : 0;
 
-	return (uint32_t)(two_sided != NULL && two_sided[c->part]) << 16 | du << 8 | dv;
+	if (grouping->is_two_sided != NULL && grouping->is_two_sided[c->part])
+		flags |= DPOINT_TWO_SIDED;
+	return flags << 16 | du << 8 | dv;
 }
 
 /* Groups before they are in their order: the first key of each. */
 struct cut_group {
 	struct dpoint_group group;
-	uint32_t morton, first; /* of its middle; of its keys */
+	uint32_t morton, first; /* of its middle, those that lean last; of its keys */
 };
 
 static int compare_groups(const void *a, const void *b)
@@ -97,11 +107,11 @@ static size_t cut_all(struct cut_group *to, const struct radix_entry *key, size_
 		g->n = (uint8_t)cut(low, high, &key[i], n - i, surface);
 		g->delta[0] = (uint8_t)(kind >> 8);
 		g->delta[1] = (uint8_t)kind;
-		g->flags = kind >> 16 ? DPOINT_TWO_SIDED : 0;
+		g->flags = (uint8_t)(kind >> 16);
 		dpoint_box_make(&g->box, low, high);
 		for (int k = 0; k < 3; k++)
 			middle[k] = 0.5f * (low[k] + high[k]);
-		cut_group->morton = morton_of(middle);
+		cut_group->morton = morton_of(middle) | (g->flags & DPOINT_LEANING ? 1u << MORTON_BITS : 0);
 		cut_group->first = (uint32_t)i;
 	}
 	return n_groups;
@@ -125,7 +135,7 @@ static void group_all(struct making *m, int has_own)
 
 		if (m->grouping->choice->is_kept[i])
 			m->key[m->n++] = (struct radix_entry){
-				key_of(kind_of(c, m->grouping->is_two_sided, has_own), morton_of(c->point.at)), i };
+				key_of(kind_of(m->grouping, i, has_own), morton_of(c->point.at)), i };
 	}
 	radix_sort(m->key, m->n);
 	m->n_groups = cut_all(m->cut_group, m->key, m->n, surface);
@@ -150,18 +160,23 @@ static int group_shortest(struct making *m)
 }
 
 static void put_words(struct dpoint_set *set, struct dpoint_group *group, struct dpoint_word *word, uint8_t (*delta)[2],
-                      const struct making *m)
+                      struct dpoint_lean *lean, const struct making *m)
 {
+	const struct dpoint_surface *surface = m->grouping->surface;
+	const size_t n_plain = surface->n_candidates - surface->n_lean;
+
 	for (uint32_t i = 0; i < set->n_groups; i++) {
 		const struct radix_entry *first = &m->key[m->cut_group[i].first];
 
 		group[i] = m->cut_group[i].group;
 		group[i].first = set->n_points;
 		for (uint32_t k = 0; k < group[i].n; k++) {
-			const struct dpoint_candidate *c = &m->grouping->surface->candidate[first[k].value];
+			const struct dpoint_candidate *c = &surface->candidate[first[k].value];
 
 			for (int side = 0; side < 2 && delta != NULL; side++)
 				delta[set->n_points][side] = (uint8_t)dpoint_delta_class(c->delta[side]);
+			if (group[i].flags & DPOINT_LEANING)
+				lean[set->n_lean++] = surface->lean[first[k].value - n_plain];
 			dpoint_pack(&word[set->n_points++], &c->point, &group[i].box);
 		}
 	}
@@ -175,6 +190,7 @@ int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *groupi
 	struct dpoint_group *group = malloc(room * sizeof *group);
 	struct dpoint_word *word = malloc(room * sizeof *word);
 	uint8_t (*delta)[2] = NULL;
+	struct dpoint_lean *lean = NULL;
 	int rc = room > UINT32_MAX ? PSR_ERR_LIMIT : PSR_OK;
 
 	*set = (struct dpoint_set){ .sine = grouping->sine, .group = group, .word = word };
@@ -184,10 +200,14 @@ int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *groupi
 		set->delta = (const uint8_t (*)[2])(delta = malloc(room * sizeof *delta));
 		rc = delta == NULL ? PSR_ERR_MEMORY : PSR_OK;
 	}
+	if (rc == PSR_OK && grouping->surface->n_lean > 0) {
+		set->lean = lean = malloc(grouping->surface->n_lean * sizeof *lean);
+		rc = lean == NULL ? PSR_ERR_MEMORY : PSR_OK;
+	}
 	if (rc == PSR_OK) {
 		qsort(m.cut_group, m.n_groups, sizeof *m.cut_group, compare_groups);
 		set->n_groups = (uint32_t)m.n_groups;
-		put_words(set, group, word, delta, &m);
+		put_words(set, group, word, delta, lean, &m);
 	}
 	free(m.key);
 	free(m.cut_group);
@@ -199,6 +219,7 @@ void dpoint_set_fini(struct dpoint_set *set)
 	free((void *)(uintptr_t)set->group);
 	free((void *)(uintptr_t)set->word);
 	free((void *)(uintptr_t)set->delta);
+	free((void *)(uintptr_t)set->lean);
 	memset(set, 0, sizeof *set);
 }
 

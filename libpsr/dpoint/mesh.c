@@ -3,10 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "base/vec.h"
 #include "cut.h"
 
 #define MOST_GRAINS (1u << 27)
+#define SKEW 0.004f    /* two triangles are a rectangle, but for this part */
+#define LINEAR 0.9995f /* cosine: of 1.8 degrees */
 
 /* A strip beside an open edge, in the triangle's plane, as wide as a cell. */
 static int put_strip(const struct cutting *c, int side)
@@ -154,23 +157,118 @@ static int put_facets(struct cutting *c, const struct corners *corners, const st
 	return rc == PSR_OK ? facets_sort(&c->surface->facets) : rc;
 }
 
+/* How much higher one corner is than another, along a normal. */
+static double slit_of(const struct cutting *c, const double normal[3])
+{
+	double low = INFINITY, high = -INFINITY;
+
+	for (int i = 0; i < 3; i++) {
+		const double height = v3d_dot(c->corner[i]->at, normal);
+
+		low = fmin(low, height);
+		high = fmax(high, height);
+	}
+	return high - low;
+}
+
+/* Adds the triangle to the faces if its normals lean from it; first: its first cell. */
+static int put_face(const struct cutting *c, const float bend[3], size_t first)
+{
+	const float slit = c->options->cover != NULL ? c->options->cover->slit : 0;
+	struct dpoint_face *face;
+	double most = 0;
+
+	for (int i = 0; i < 3; i++)
+		most = fmax(most, slit_of(c, c->corner[i]->normal));
+	if (slit == 0 || !(most > (double)slit) || c->surface->n_cells == first)
+		return PSR_OK;
+	if (!ARRAY_ROOM(c->surface->face, c->surface->n_faces, c->surface->faces_room))
+		return PSR_ERR_MEMORY;
+	face = &c->surface->face[c->surface->n_faces++];
+	*face = (struct dpoint_face){ .part = c->material, .first_cell = (uint32_t)first,
+		                          .n_cells = (uint32_t)(c->surface->n_cells - first), .twin = UINT32_MAX };
+	for (int i = 0; i < 3; i++) {
+		for (int k = 0; k < 3; k++) {
+			face->corner[i][k] = (float)c->corner[i]->at[k];
+			face->normal[i][k] = (float)c->corner[i]->normal[k];
+		}
+		face->bend[i] = bend[i];
+	}
+	return PSR_OK;
+}
+
+/* Whether the face and the next one beyond a side are a rectangle, in which normals between corners are linear. */
+static int is_rectangle(const struct dpoint_face *face, int side, const float next[3], const float next_normal[3])
+{
+	const int a = side, b = (side + 1) % 3, c = (side + 2) % 3;
+	float x[3], y[3], d[3], normal[3];
+
+	v3f_sub(x, face->corner[a], face->corner[c]);
+	v3f_sub(y, face->corner[b], face->corner[c]);
+	v3f_add(d, face->corner[c], x);
+	v3f_add(d, d, y);
+	v3f_sub(d, d, next);
+	v3f_add(normal, face->normal[a], face->normal[b]);
+	v3f_sub(normal, normal, face->normal[c]);
+	v3f_normalize(normal, normal);
+	return fabsf(v3f_dot(x, y)) <= SKEW * v3f_length(x) * v3f_length(y) &&
+	       v3f_length(d) <= SKEW * fminf(v3f_length(x), v3f_length(y)) && v3f_dot(normal, next_normal) >= LINEAR;
+}
+
+/* face_of: by triangle. */
+static void find_twin(struct dpoint_surface *surface, uint32_t triangle, const uint32_t *face_of,
+                      const struct corners *corners)
+{
+	struct dpoint_face *face = &surface->face[face_of[triangle]];
+
+	for (int i = 0; i < 3 && face->twin == UINT32_MAX; i++) {
+		const uint32_t next = corners->next[3 * (size_t)triangle + (size_t)i];
+		const uint32_t f = next != UINT32_MAX ? face_of[next / 3] : UINT32_MAX;
+		struct dpoint_face *other = f != UINT32_MAX ? &surface->face[f] : NULL;
+		const int beyond = (int)(next % 3 + 2) % 3;
+
+		if (other == NULL || other->twin != UINT32_MAX || other->part != face->part ||
+		    face->bend[i] > SKEW || !is_rectangle(face, i, other->corner[beyond], other->normal[beyond]))
+			continue;
+		face->twin = f;
+		face->shared = i;
+		other->twin = face_of[triangle];
+		other->shared = (int)(next % 3);
+	}
+}
+
 static int put_cells(struct cutting *c, const struct corners *corners, const struct psr_mesh *mesh,
                      struct psr_error *err)
 {
-	int rc = PSR_OK;
+	uint32_t *face_of = malloc((mesh->n_triangles + (size_t)1) * sizeof *face_of);
+	int rc = face_of != NULL ? PSR_OK : PSR_ERR_MEMORY;
 
 	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++) {
+		const size_t n_faces = c->surface->n_faces;
+		size_t first;
+
+		face_of[t] = UINT32_MAX;
+
 		if (is_of_patch(mesh, t))
 			continue;
 		look_at(c, corners, mesh, t);
+		first = c->surface->n_cells;
 		cut_plan(c, corners->is_open[t]);
 		rc = cut(c);
+		if (rc == PSR_OK)
+			rc = put_face(c, &corners->bend[3 * (size_t)t], first);
+		if (c->surface->n_faces > n_faces)
+			face_of[t] = (uint32_t)n_faces;
 		for (int i = 0; i < 3 && rc == PSR_OK; i++)
 			if (corners->is_open[t] >> i & 1)
 				rc = put_strip(c, i);
 		if (rc == PSR_ERR_LIMIT || (rc == PSR_OK && c->surface->n_cells > CUT_MOST_PIECES))
 			rc = refuse_pieces(c->options, err);
 	}
+	for (uint32_t t = 0; t < mesh->n_triangles && rc == PSR_OK; t++)
+		if (face_of[t] != UINT32_MAX)
+			find_twin(c->surface, t, face_of, corners);
+	free(face_of);
 	return rc;
 }
 

@@ -21,13 +21,4 @@ int keep_over_open(struct dpoint_choice *choice, const struct dpoint_cover *cove
 /* Keeps the candidates `before` to n - 1, which were added after the choice. MEMORY. */
 int keep_added(struct dpoint_choice *choice, size_t before, size_t n);
 
-/* Adds points behind faces that their normals lean from. There rectangles, which stand on normals, are the slats of a
- * blind: who looks along such a face sees between them, or sees all of them from behind, which is nothing. So where
- * rays that graze cells of such slits get behind the slats, rectangles in the plane of the face are put some half of a
- * sample further behind it, each as large as the face and what goes on in its plane let it be. They are seen through
- * slits alone. Surfaces of two sides are left as they are.
- * Adds to surface, choice and cover. MEMORY, CANCELLED. */
-int line_slits(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
-               const struct dpoint_cover_options *options, const struct dpoint_work *work);
-
 #endif

@@ -1,4 +1,4 @@
-/* Whether rays to a cell slip through between lids: what seal.c and lining.c ask of each. */
+/* Whether rays to a cell slip through between lids: what seal.c and lean.c ask of each. */
 #ifndef PSR_DPOINT_SEALED_H
 #define PSR_DPOINT_SEALED_H
 

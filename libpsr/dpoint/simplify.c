@@ -4,6 +4,7 @@
 #include <string.h>
 #include "base/random.h"
 #include "choice.h"
+#include "lean.h"
 #include "seal.h"
 
 #define CHOICE 48       /* candidates of the first turn in a rectangle; decision 0112 */
@@ -137,7 +138,7 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 	if (rc == PSR_OK)
 		rc = seal(surface, choice, cover, options, &work);
 	if (rc == PSR_OK)
-		rc = line_slits(surface, choice, cover, options, &work);
+		rc = tile_faces(surface, choice, cover, options, &work);
 	if (rc == PSR_OK)
 		paint(surface, choice, cover, options);
 	return rc;

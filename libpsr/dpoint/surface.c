@@ -13,6 +13,8 @@ void dpoint_surface_fini(struct dpoint_surface *surface)
 {
 	free(surface->cell);
 	free(surface->candidate);
+	free(surface->face);
+	free(surface->lean);
 	facets_fini(&surface->facets);
 	memset(surface, 0, sizeof *surface);
 }

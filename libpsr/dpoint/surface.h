@@ -15,8 +15,6 @@ struct dpoint_cell {
 	float normal[3];   /* in its middle, of unit length; 0,0,0 where there is none, at poles */
 	uint32_t part;     /* of the source: a patch, a material; or DPOINT_BEYOND */
 	uint64_t attr;     /* of points in it, without a normal */
-	float slit;        /* how much higher one corner of its face is than another, along the cell's normal, where that
-	                    * leans from the face: rectangles on such normals stand as slats do; else 0 */
 };
 
 static inline void dpoint_cell_middle(float m[3], const struct dpoint_cell *cell)
@@ -44,10 +42,23 @@ static inline void dpoint_candidate_extent(float extent[2], const struct dpoint_
 	dpoint_extent(extent, &c->point, &limit);
 }
 
+/* A triangle whose corners' normals lean from it: rectangles on them stand as the slats of a blind do. */
+struct dpoint_face {
+	float corner[3][3], normal[3][3];
+	float bend[3];              /* of the side from a corner to the next: the sine of the angle to the next face; 1 from a
+	                             * right one on, and where there is a crease, or no such face */
+	uint32_t part, first_cell, n_cells;
+	uint32_t twin;              /* which face makes it a rectangle, beyond its side `shared`; UINT32_MAX: none does */
+	int shared;
+};
+
 struct dpoint_surface {
 	struct dpoint_cell *cell;
 	struct dpoint_candidate *candidate;
 	size_t n_cells, n_candidates, cells_room, candidates_room;
+	struct dpoint_face *face;   /* of a mesh: those that may be tiled (lean.h) */
+	struct dpoint_lean *lean;   /* of the last n_lean candidates */
+	size_t n_faces, n_lean, faces_room, lean_room;
 	uint64_t n_bad, n_clamped;  /* candidates that were left out; whose curvature was brought to the bound */
 	struct facets facets;       /* of a mesh or a cloud; of other sources there are none */
 	float margin;               /* of its cover's options */
@@ -90,7 +101,8 @@ struct dpoint_cover_options {
 	 * So neighbours overlap, and what words tilt them by is no gap from aslant. */
 	float margin, delta;
 	float graze;       /* that slanted rays may count on (seal.h): half of what is drawn; 0: none */
-	float slit;        /* dpoint_simplify() lines faces whose slit is wider; 0: none */
+	float slit;        /* of faces whose corners are further apart along the normal of one, those that are seen through
+	                    * are tiled (lean.h); 0: none */
 	const uint8_t *is_two_sided; /* by part: rectangles that are seen from both sides; NULL: none is */
 };
 

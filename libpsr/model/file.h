@@ -23,6 +23,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define FILE_MINOR_DELTAS 5
 #define FILE_MINOR_OFF 6 /* blocks: but for those of the trait off, samples are within PSR_SAMPLE_OFF */
 #define FILE_MINOR_LEAN 7
+#define FILE_MINOR_POINT_LEAN 8
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */
 #define FILE_HEADER_BYTES 64
@@ -46,7 +47,7 @@ enum { ENTRY_REQUIRED = 1 };
 enum section_count {
 	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_RUNS, COUNT_MASKS, COUNT_BLOCKS,
 	COUNT_SAMPLES, COUNT_SKIPS, COUNT_CODES, COUNT_LEAVES, COUNT_CALIBRATED, COUNT_GROUPS, COUNT_POINTS,
-	COUNT_DELTAS, COUNT_LEAN
+	COUNT_DELTAS, COUNT_LEAN, COUNT_POINT_LEAN
 };
 
 enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY,
@@ -54,7 +55,7 @@ enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS,
 	              SECTION_CALIBRATION = 32, SECTION_POINTS, SECTION_FIRST_OF_POINTS, SECTION_FIRST_OF_SCAN = 36,
 	              SECTION_END_OF_SCAN = 41,
 	              SECTION_CALIBRATION_FINE = 41, SECTION_ONE_MATERIAL, SECTION_DELTAS, SECTION_LEAN,
-	              N_KNOWN_SECTIONS };
+	              SECTION_POINT_LEAN, N_KNOWN_SECTIONS };
 
 struct section_spec {
 	char type[5];
@@ -174,6 +175,7 @@ void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16]);
 /* DPNT: to and from its POINTS_BYTES, unchecked. */
 void file_put_points(uint8_t *at, const struct dpoint_set *set);
 void file_get_points(struct dpoint_set *set, const uint8_t *at);
+uint32_t file_lean_count(uint64_t length); /* of a section DLEN of that length, to which it is cut down */
 
 /* Checks the fixed part of a header of FILE_HEADER_BYTES; `name` begins the error text. */
 int file_check_header(const uint8_t *header, const char *name, struct psr_error *err);

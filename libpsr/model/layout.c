@@ -14,6 +14,7 @@ _Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct
 _Static_assert(sizeof(struct dpoint_group) == 32 && offsetof(struct dpoint_group, first) == 24
                && offsetof(struct dpoint_group, flags) == 31, "section DGRP");
 _Static_assert(sizeof(struct dpoint_word) == 16 && offsetof(struct dpoint_word, attr) == 8, "section DWRD");
+_Static_assert(sizeof(struct dpoint_lean) == 12 && offsetof(struct dpoint_lean, by) == 4, "section DLEN");
 _Static_assert(sizeof(struct octree_skip) == 24 && offsetof(struct octree_skip, leaf) == 16, "section OSKP");
 
 #define SET(type, count, item, field) \
@@ -70,6 +71,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_ONE_MATERIAL] = TREE("OMT1", COUNT_ONE, 3, one_material),
 	[SECTION_LEAN] = TREE("OLEN", COUNT_LEAN, 1, lean),
 	[SECTION_DELTAS] = SET("DDLT", COUNT_DELTAS, 2, delta),
+	[SECTION_POINT_LEAN] = SET("DLEN", COUNT_POINT_LEAN, 12, lean),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -108,6 +110,8 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 		return content->points.n_points;
 	case COUNT_LEAN:
 		return OCTREE_LEAN_CELLS;
+	case COUNT_POINT_LEAN:
+		return content->points.n_lean;
 	case COUNT_ONE:
 		break;
 	}
@@ -130,7 +134,7 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 
 	if (k == SECTION_CALIBRATION_FINE)
 		return !content->has_blocks;
-	if (k == SECTION_DELTAS || (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN))
+	if (k == SECTION_DELTAS || k == SECTION_POINT_LEAN || (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN))
 		return !content->has_points;
 	if ((k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE) || k >= SECTION_FIRST_OF_SCAN)
 		return !content->has_octree;
@@ -295,6 +299,8 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 /* The first version that knows all sections. */
 static unsigned minor_of(const struct content *content)
 {
+	if (is_present(SECTION_POINT_LEAN, content))
+		return FILE_MINOR_POINT_LEAN;
 	if (is_present(SECTION_LEAN, content))
 		return FILE_MINOR_LEAN;
 	if (content->blocks.n_blocks != 0 && !(content->blocks.traits_of_all & PSR_BLOCK_OLD))

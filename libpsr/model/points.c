@@ -34,6 +34,13 @@ void file_get_points(struct dpoint_set *set, const uint8_t *at)
 	set->height = psr_float_from_bits((uint32_t)file_get(at + SET_HEIGHT, 4));
 }
 
+uint32_t file_lean_count(uint64_t length)
+{
+	const uint64_t n = length / section_table[SECTION_POINT_LEAN].item_bytes;
+
+	return n < UINT32_MAX ? (uint32_t)n : UINT32_MAX;
+}
+
 int model_check_point_counts(const struct dpoint_set *set, const char *name, struct psr_error *err)
 {
 	if (set->n_groups == 0 || set->n_groups > MODEL_MAX_BLOCKS)
@@ -41,6 +48,8 @@ int model_check_point_counts(const struct dpoint_set *set, const char *name, str
 	if (set->n_points < set->n_groups || set->n_points / DPOINT_GROUP > set->n_groups)
 		return fail("DPNT", "%" PRIu32 " points do not fit %" PRIu32 " groups of up to %d", set->n_points, set->n_groups,
 		            DPOINT_GROUP);
+	if (set->n_lean > set->n_points)
+		return fail("DLEN", "%" PRIu32 " of %" PRIu32 " points lean", set->n_lean, set->n_points);
 	/* Not (... > ...), so that NaN fails as well. */
 	if (!(set->sine > 0 && set->sine <= 1) || !(set->height >= 0 && set->height <= 2))
 		return fail("DPNT", "the sine %g is not above 0 and at most 1, or the height %g not 0 to 2", (double)set->sine,
@@ -58,9 +67,12 @@ static int check_group(const struct dpoint_set *set, uint32_t i, uint64_t next, 
 		            PRIu32, i, g->n, g->first, next, set->n_points);
 	for (int k = 0; k < 2; k++)
 		is_bad |= set->delta != NULL ? g->delta[k] != DPOINT_OWN_DELTA : g->delta[k] >= DPOINT_DELTA_CLASSES;
-	if (is_bad || (g->flags & ~DPOINT_TWO_SIDED) != 0)
+	if (is_bad || (g->flags & ~(DPOINT_TWO_SIDED | DPOINT_LEANING)) != 0)
 		return fail("DGRP", "group %" PRIu32 " has deltas of classes %d and %d, and flags %d", i, g->delta[0], g->delta[1],
 		            g->flags);
+	if (((g->flags & DPOINT_LEANING) != 0) != (g->first >= set->n_points - set->n_lean))
+		return fail("DGRP", "group %" PRIu32 " of point %" PRIu32 " has flags %d; the last %" PRIu32 " of %" PRIu32 " points"
+		            " lean", i, g->first, g->flags, set->n_lean, set->n_points);
 	for (int k = 0; k < 3; k++)
 		if (!(fabsf(g->box.low[k]) <= MOST_SPHERE) || !(g->box.step[k] >= 0 && g->box.step[k] <= MOST_SPHERE))
 			return fail("DGRP", "the box of group %" PRIu32 " begins at %g and has steps of %g", i,
@@ -87,6 +99,11 @@ int model_validate_points(const struct dpoint_set *set, const char *name, struct
 	for (uint32_t i = 0; i < set->n_points && set->delta != NULL; i++)
 		if (set->delta[i][0] >= DPOINT_DELTA_CLASSES || set->delta[i][1] >= DPOINT_DELTA_CLASSES)
 			return fail("DDLT", "point %" PRIu32 " has deltas of classes %d and %d", i, set->delta[i][0], set->delta[i][1]);
+	for (uint32_t i = 0; i < set->n_lean; i++)
+		for (int k = 0; k < 4; k++)
+			if (!(fabsf(dpoint_lean_by(set->lean[i].by[k / 2][k % 2])) <= DPOINT_MOST_LEAN_BY))
+				return fail("DLEN", "the lean of point %" PRIu32 " grows by %g", i,
+				            (double)dpoint_lean_by(set->lean[i].by[k / 2][k % 2]));
 	return PSR_OK;
 }
 

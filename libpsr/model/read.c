@@ -94,6 +94,8 @@ static int get_points(const struct reader *r, struct dpoint_set *set)
 	if (code != PSR_OK)
 		return code;
 	file_get_points(set, at);
+	if (r->entry[SECTION_POINT_LEAN] >= 0)
+		set->n_lean = file_lean_count(read_section(r, (uint32_t)r->entry[SECTION_POINT_LEAN]).length);
 	return model_check_point_counts(set, r->name, r->err);
 }
 
@@ -103,7 +105,8 @@ static int check_set(const struct reader *r, const struct content *content)
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const int is_of_blocks = k < SECTION_OCTREE || k == SECTION_CALIBRATION_FINE;
-		const int is_of_points = k == SECTION_DELTAS || (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN);
+		const int is_of_points = k == SECTION_DELTAS || k == SECTION_POINT_LEAN ||
+		                         (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN);
 		const char *first = is_of_blocks ? "BLKS" : is_of_points ? "DPNT" : "OCTR";
 
 		if (section_is_foreign(spec, content) && r->entry[k] >= 0)

@@ -118,6 +118,15 @@ int unpack_read_octree(const struct unpacker *u, uint8_t *bytes, uint64_t n)
 	return code;
 }
 
+/* How many points DLEN says that lean: its length is all that does. */
+static uint32_t lean_of(const struct unpacker *u)
+{
+	for (uint32_t i = 0; i < u->n_sections; i++)
+		if (file_is_section(unpack_entry(u, i), SECTION_POINT_LEAN))
+			return file_lean_count(file_get(unpack_entry(u, i) + ENTRY_LENGTH, 8));
+	return 0;
+}
+
 /* Compares lengths of known sections with the counts in BLKS, OCTR and DPNT before allocating; file_parse() reports other
  * errors better, that of CALF among them. */
 static int check_lengths(struct unpacker *u)
@@ -143,6 +152,7 @@ static int check_lengths(struct unpacker *u)
 	}
 	if (code == PSR_OK && counts.has_points) {
 		file_get_points(&content.points, counts.points);
+		content.points.n_lean = lean_of(u);
 		code = model_check_point_counts(&content.points, u->source->name, u->err);
 	}
 	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {

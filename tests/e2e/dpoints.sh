@@ -104,7 +104,7 @@ else
 	skip "differential points of STEP" "a build without Open CASCADE"
 fi
 
-# Faces that normals of their corners lean from, seen aslant: before they were lined, 59 pixels of this view were holes.
+# Faces that normals of their corners lean from, seen aslant: before points leant, 59 pixels of this view were holes.
 if [ -f "$PSR_MODELS/rotor.off" ]; then
 	psr-model build "$PSR_MODELS/rotor.off" --representation dpoints -r 512 -q -o "$work/rotor.psr"
 	psr shot "$work/rotor.psr" --size 500x500 --azimuth 72.588 --elevation 2.388 -o "$work/rotor.ppm" \

@@ -1,6 +1,7 @@
 /* Any bytes as a .psr file, plain or packed: as they are, and with their hashes put right, since no mutation would come
  * past those. Properties: what is taken obeys the rules that readers rely on, and the same model made again from its
  * arrays is taken too and holds the same. */
+#include <math.h>
 #include <stdlib.h>
 #include "model/pack.h"
 
@@ -63,9 +64,13 @@ static void check_points(const struct dpoint_set *set)
 		for (uint32_t k = 0; k < g->n; k++)
 			for (int side = 0; side < 2; side++)
 				REQUIRE((set->delta != NULL ? set->delta[g->first + k] : g->delta)[side] < DPOINT_DELTA_CLASSES);
+		REQUIRE(!(g->flags & DPOINT_LEANING) == (g->first < set->n_points - set->n_lean));
 		n_points += g->n;
 	}
-	REQUIRE(n_points == set->n_points);
+	REQUIRE(n_points == set->n_points && set->n_lean <= n_points && (set->n_lean == 0) == (set->lean == NULL));
+	for (uint32_t i = 0; i < set->n_lean; i++)
+		for (int k = 0; k < 4; k++)
+			REQUIRE(fabsf(dpoint_lean_by(set->lean[i].by[k / 2][k % 2])) <= DPOINT_MOST_LEAN_BY);
 }
 
 static void check_rules(const struct content *content)

@@ -70,8 +70,8 @@ static struct scene *random_scene(struct check *c, uint32_t n_groups, uint32_t n
 		for (uint32_t i = 0; i < n_groups; i++)
 			group[i].delta[0] = group[i].delta[1] = DPOINT_OWN_DELTA;
 	}
-	s->set = (struct dpoint_set){ n_groups, n, (float)check_real(c, 0.01, 0.3), 0, group, word,
-		                          (const uint8_t (*)[2])delta };
+	s->set = (struct dpoint_set){ .n_groups = n_groups, .n_points = n, .sine = (float)check_real(c, 0.01, 0.3),
+		                          .group = group, .word = word, .delta = (const uint8_t (*)[2])delta };
 	s->points.groups = (struct psr_blocks){ .n_blocks = n_groups, .n_levels = 1, .flags = flags };
 	s->points.set = &s->set;
 	return s;

@@ -10,7 +10,7 @@
 
 #define OVERHANG 5e-4f
 #define SLACK 2e-5f       /* half a step of a place */
-#define SLIT 2            /* pixels: who sees a wider one sees through it */
+#define SLIT 0.5          /* pixels: of faces whose corners are further apart along a normal, some are seen through */
 #define SPARSE 4          /* of candidates that come in two turns */
 
 void dpoint_build_options_default(struct dpoint_build_options *options, uint32_t resolution)

@@ -11,6 +11,8 @@ _Static_assert(STRIP <= POINTS_BATCH && STRIP_PADDING <= POINTS_VECTOR, "a strip
 struct points_runs {
 	struct points_unpacked p;
 	uint32_t id[STRIP + 1 + POINTS_VECTOR];
+	const struct dpoint_lean *lean[POINTS_ROOM];
+	int has_lean;
 	float begin[3][POINTS_ROOM];            /* the eye from the point */
 	uint32_t run[STRIP + POINTS_VECTOR];    /* of a pixel */
 	/* By pixel. */
@@ -44,10 +46,13 @@ static inline void list_runs(struct points_runs *to, const struct strip_pixels *
 	const uint32_t n = POINTS_FIND_RUNS(to->run, to->id, p->id, first, end);
 
 	to->p.n = n + 1;
+	to->has_lean = 0;
 	for (uint32_t r = 0; r <= n; r++) {
 		const struct dpoint_group *g = &set->group[to->id[r] / PSR_BLOCK_SAMPLES - in->first_slot];
 
 		points_list(&to->p, r, points, &set->word[g->first + to->id[r] % PSR_BLOCK_SAMPLES]);
+		to->lean[r] = dpoint_lean_of(set, g, to->id[r] % PSR_BLOCK_SAMPLES);
+		to->has_lean |= to->lean[r] != NULL;
 		for (int c = 0; c < 3; c++) {
 			to->p.step[c][r] = g->box.step[c];
 			to->begin[c][r] = (float)(points->eye[c] - (double)g->box.low[c]);
@@ -96,18 +101,50 @@ static inline void spread_runs(struct points_runs *runs, uint32_t first, uint32_
 	POINTS_SPREAD(to, from, runs->run, first, end);
 }
 
-static void points_resolve(struct strip *strip, const struct strip_view *view, const struct warp_instance *in,
-                           uint32_t first, uint32_t end)
+/* local: where a line of sight meets the point's plane, along u and v. */
+static inline void add_lean(float n[2], const struct dpoint_lean *lean, const float local[2])
+{
+	for (int c = 0; c < 2; c++)
+		n[c] += (float)lean->at[c] * DPOINT_LEAN_STEP
+		        + (dpoint_lean_by(lean->by[c][0]) * local[0] + dpoint_lean_by(lean->by[c][1]) * local[1]);
+}
+
+/* Surface normals are shading's. */
+static inline void strip_copy_normals(struct strip *strip, uint32_t first, uint32_t end)
+{
+	memcpy(strip->gx + first, strip->nx + first, (end - first) * sizeof *strip->nx);
+	memcpy(strip->gy + first, strip->ny + first, (end - first) * sizeof *strip->ny);
+	memcpy(strip->gz + first, strip->nz + first, (end - first) * sizeof *strip->nz);
+}
+
+/* Surface normals of points that lean are those of their planes. */
+static void find_planes(struct strip *strip, const struct points_runs *of, const float turn[3][3], uint32_t first,
+                        uint32_t end)
+{
+	strip_copy_normals(strip, first, end);
+	for (uint32_t i = first; i < end; i++) {
+		const float x = of->axis[2][0][i], y = of->axis[2][1][i], z = of->axis[2][2][i];
+
+		if (of->lean[of->run[i]] == NULL)
+			continue;
+		strip->gx[i] = (turn[0][0] * x + turn[0][1] * y) + turn[0][2] * z;
+		strip->gy[i] = (turn[1][0] * x + turn[1][1] * y) + turn[1][2] * z;
+		strip->gz[i] = (turn[2][0] * x + turn[2][1] * y) + turn[2][2] * z;
+	}
+}
+
+/* has_lean: a constant of the caller. */
+static inline __attribute__((always_inline)) void resolve_runs(struct strip *strip, const struct strip_view *view,
+                                                               const struct warp_instance *in,
+                                                               const struct points_runs *of, uint32_t first,
+                                                               uint32_t end, int has_lean)
 {
 	const struct warp_points *points = in->points;
 	const struct strip_pixels *p = strip->pixels;
 	const int perspective = view->perspective;
 	const float y = (float)p->y + 0.5f - points->center[1], center_x = points->center[0];
-	struct points_runs of;
 	float depth[STRIP];
 
-	list_runs(&of, p, in, first, end);
-	spread_runs(&of, first, end);
 	for (uint32_t i = first; i < end; i++)
 		depth[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
 	for (uint32_t i = first; i < end; i++) {
@@ -116,12 +153,14 @@ static void points_resolve(struct strip *strip, const struct strip_view *view, c
 		float away[3], normal[3], n[3], local[2];
 
 		for (int k = 0; k < 3; k++)
-			away[k] = of.at[k][i] + (wide * (x * points->right[k] + y * points->down[k]) + z * points->forward[k]);
+			away[k] = of->at[k][i] + (wide * (x * points->right[k] + y * points->down[k]) + z * points->forward[k]);
 		for (int k = 0; k < 2; k++)
-			local[k] = (of.axis[k][0][i] * away[0] + of.axis[k][1][i] * away[1]) + of.axis[k][2][i] * away[2];
-		dpoint_normal_at(n, of.lambda[0][i], of.lambda[1][i], local[0], local[1]);
+			local[k] = (of->axis[k][0][i] * away[0] + of->axis[k][1][i] * away[1]) + of->axis[k][2][i] * away[2];
+		dpoint_normal_at(n, of->lambda[0][i], of->lambda[1][i], local[0], local[1]);
+		if (has_lean && of->lean[of->run[i]] != NULL)
+			add_lean(n, of->lean[of->run[i]], local);
 		for (int k = 0; k < 3; k++)
-			normal[k] = (n[0] * of.axis[0][k][i] + n[1] * of.axis[1][k][i]) + of.axis[2][k][i];
+			normal[k] = (n[0] * of->axis[0][k][i] + n[1] * of->axis[1][k][i]) + of->axis[2][k][i];
 		const float unit = 1 / __builtin_sqrtf((normal[0] * normal[0] + normal[1] * normal[1]) + normal[2] * normal[2]);
 		const float nx = (in->turn[0][0] * normal[0] + in->turn[0][1] * normal[1]) + in->turn[0][2] * normal[2];
 		const float ny = (in->turn[1][0] * normal[0] + in->turn[1][1] * normal[1]) + in->turn[1][2] * normal[2];
@@ -131,6 +170,25 @@ static void points_resolve(struct strip *strip, const struct strip_view *view, c
 		strip->ny[i] = ny * unit;
 		strip->nz[i] = nz * unit;
 	}
+}
+
+static void points_resolve(struct strip *strip, const struct strip_view *view, const struct warp_instance *in,
+                           uint32_t first, uint32_t end)
+{
+	struct points_runs of;
+
+	list_runs(&of, strip->pixels, in, first, end);
+	spread_runs(&of, first, end);
+	if (of.has_lean)
+		resolve_runs(strip, view, in, &of, first, end, 1);
+	else
+		resolve_runs(strip, view, in, &of, first, end, 0);
+	if (!(view->needs & (STRIP_POSITION | STRIP_TWO_SIDED)))
+		return;
+	if (of.has_lean)
+		find_planes(strip, &of, in->turn, first, end);
+	else
+		strip_copy_normals(strip, first, end);
 }
 
 #endif

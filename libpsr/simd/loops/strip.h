@@ -301,6 +301,7 @@ static void ewa_resolve(struct strip *strip, const struct strip_view *view, uint
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const struct strip_pixels *p = strip->pixels;
+	const int has_surface = (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED)) != 0;
 	const uint32_t n = strip->n;
 
 	if (view->lit && !strip->is_specular) {
@@ -316,19 +317,17 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	for (uint32_t first = 0, end; first < n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, n);
 
-		if (in->points)
+		if (in->points) {
 			points_resolve(strip, view, in, first, end);
-		else
-			turn_normals(strip, in->turn, first, end);
+			continue;
+		}
+		turn_normals(strip, in->turn, first, end);
 		if (in->cubes && view->sum)
 			ewa_resolve(strip, view, first, end);
 		if (p->has_cones)
 			straighten(strip, in->turn, first, end);
-	}
-	if (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED) && !p->has_cones) {
-		memcpy(strip->gx, strip->nx, n * sizeof *strip->nx);
-		memcpy(strip->gy, strip->ny, n * sizeof *strip->ny);
-		memcpy(strip->gz, strip->nz, n * sizeof *strip->nz);
+		else if (has_surface)
+			strip_copy_normals(strip, first, end);
 	}
 	for (uint32_t i = 0; i < n; i++)
 		strip->lr[i] = strip->lg[i] = strip->lb[i] = 0;

@@ -16,7 +16,8 @@
 static struct fixture fixture;
 static struct dpoint_set set;    /* whose points have deltas of their own */
 static struct dpoint_set shared; /* the same with a delta a group */
-static struct psr_model *alone, *with_blocks, *of_shared;
+static struct dpoint_set leaning; /* the same whose last three groups lean */
+static struct psr_model *alone, *with_blocks, *of_shared, *of_leaning;
 
 static void make_shared(void)
 {
@@ -29,6 +30,25 @@ static void make_shared(void)
 		group[i].delta[0] = group[i].delta[1] = (uint8_t)(12 + i % 4);
 	assert_int_equal(psr_model_create_of(&of_shared, &fixture.info, &(struct psr_model_parts){ .points = &shared }, NULL,
 	                                     NULL), PSR_OK);
+}
+
+static void make_leaning(void)
+{
+	struct dpoint_group *group = malloc(shared.n_groups * sizeof *group);
+	const struct dpoint_group *first = &shared.group[shared.n_groups - 3];
+	struct dpoint_lean *lean;
+
+	leaning = shared;
+	leaning.n_lean = shared.n_points - first->first;
+	leaning.group = memcpy(group, shared.group, shared.n_groups * sizeof *group);
+	leaning.lean = lean = malloc(leaning.n_lean * sizeof *lean);
+	for (uint32_t i = 0; i < 3; i++)
+		group[shared.n_groups - 1 - i].flags |= DPOINT_LEANING;
+	for (uint32_t i = 0; i < leaning.n_lean; i++)
+		lean[i] = (struct dpoint_lean){ { (int16_t)(100 * i), (int16_t)(-7 * (int)i) },
+			                            { { 0x3f80, 0xbf80 }, { 0, (uint16_t)(0x4000 + i) } } };
+	assert_int_equal(psr_model_create_of(&of_leaning, &fixture.info, &(struct psr_model_parts){ .points = &leaning },
+	                                     NULL, NULL), PSR_OK);
 }
 
 static int setup(void **state)
@@ -46,6 +66,7 @@ static int setup(void **state)
 	                                     NULL), PSR_OK);
 	assert_non_null(set.delta);
 	make_shared();
+	make_leaning();
 	return 0;
 }
 
@@ -55,7 +76,10 @@ static int teardown(void **state)
 	psr_model_unref(alone);
 	psr_model_unref(with_blocks);
 	psr_model_unref(of_shared);
+	psr_model_unref(of_leaning);
 	free((void *)(uintptr_t)shared.group);
+	free((void *)(uintptr_t)leaning.group);
+	free((void *)(uintptr_t)leaning.lean);
 	dpoint_set_fini(&set);
 	return 0;
 }
@@ -70,17 +94,22 @@ static void assert_set(const struct dpoint_set *other, const struct dpoint_set *
 	assert_int_equal(other->delta == NULL, like->delta == NULL);
 	if (like->delta != NULL)
 		assert_memory_equal(other->delta, like->delta, like->n_points * sizeof *like->delta);
+	assert_int_equal(other->n_lean, like->n_lean);
+	assert_int_equal(other->lean == NULL, like->lean == NULL);
+	if (like->lean != NULL)
+		assert_memory_equal(other->lean, like->lean, like->n_lean * sizeof *like->lean);
 }
 
 static void points_survive_file_map_and_packing(void **state)
 {
 	char folder[] = "/tmp/psr-model-XXXXXX", path[64];
-	struct psr_model *const models[3] = { alone, with_blocks, of_shared };
+	struct psr_model *const models[4] = { alone, with_blocks, of_shared, of_leaning };
+	const struct dpoint_set *const sets[4] = { &set, &set, &shared, &leaning };
 
 	(void)state;
 	assert_non_null(mkdtemp(folder));
 	snprintf(path, sizeof path, "%s/a.psr", folder);
-	for (int i = 0; i < 3; i++)
+	for (int i = 0; i < 4; i++)
 		for (int way = 0; way < 4; way++) {
 			struct psr_model *model = NULL;
 			uint8_t id[16], other[16];
@@ -91,7 +120,7 @@ static void points_survive_file_map_and_packing(void **state)
 			else
 				assert_int_equal(psr_model_write_packed(models[i], path, NULL), PSR_OK);
 			assert_int_equal(way % 2 ? psr_model_map(&model, path, NULL) : psr_model_read(&model, path, NULL), PSR_OK);
-			assert_set(psr_model_point_set(model), i == 2 ? &shared : &set);
+			assert_set(psr_model_point_set(model), sets[i]);
 			assert_int_equal(psr_model_blocks(model) != NULL, i == 1);
 			psr_model_content_id(models[i], id);
 			psr_model_content_id(model, other);
@@ -235,7 +264,8 @@ static void lies_are_refused(void **state)
 		{ "DGRP", 30, 1, 64, "section DGRP: group 0 has deltas of classes 255 and 64" },
 		{ "DDLT", 0, 1, 64, "section DDLT: point 0 has deltas of classes 64" },
 		{ "DDLT", 2 * 3 + 1, 1, 255, "section DDLT: point 3 has deltas of classes" },
-		{ "DGRP", 31, 1, 2, "and flags 2" },
+		{ "DGRP", 31, 1, 4, "and flags 4" },
+		{ "DGRP", 31, 1, 2, "section DGRP: group 0 of point 0 has flags 2; the last 0 of" },
 		{ "DWRD", 16 * 3, 8, UINT64_MAX, "section DWRD: the curvatures of point 3" },
 		{ "DWRD", 16 * 3, 8, (uint64_t)128 << 49, "section DWRD: the curvatures of point 3" },
 	};
@@ -244,9 +274,19 @@ static void lies_are_refused(void **state)
 		{ "DGRP", 30, 1, 255, "and 255, and flags 0" },
 	};
 
+	static const struct edit of_leans[] = {
+		{ "DLEN", 4, 2, 0x7f80, "section DLEN: the lean of point 0 grows by inf" },
+		{ "DLEN", 12 + 10, 2, 0x7fc0, "section DLEN: the lean of point 1 grows by nan" },
+		{ "DLEN", 6, 2, 0xc981, "section DLEN: the lean of point 0 grows by -1.05677e+06" },
+		{ "DGRP", 31, 1, 2, "section DGRP: group 0 of point 0 has flags 2; the last" },
+	};
+	const struct edit last = { "DGRP", 32 * (leaning.n_groups - 1) + 31, 1, 0, " has flags 0; the last" };
+
 	(void)state;
 	check_edits(alone, own, sizeof own / sizeof own[0]);
 	check_edits(of_shared, of_groups, sizeof of_groups / sizeof of_groups[0]);
+	check_edits(of_leaning, of_leans, sizeof of_leans / sizeof of_leans[0]);
+	check_edits(of_leaning, &last, 1);
 }
 
 /* A section's name spoilt is a section that this build does not know. */
@@ -298,6 +338,29 @@ static void points_without_their_deltas_are_refused(void **state)
 	free(copy);
 }
 
+/* What a psr of 6.7 does, but that it names the flags: faces would be shaded flat. */
+static void leaning_points_without_their_leans_are_refused(void **state)
+{
+	struct psr_model *model = NULL;
+	struct psr_error err = { 0 };
+	size_t n;
+	uint8_t *copy = copy_of(of_leaning, &n);
+
+	(void)state;
+	assert_int_equal(file_get(copy + HEADER_MINOR, 2), FILE_MINOR_POINT_LEAN);
+	memcpy(entry_of(copy, "DLEN"), "ZZZ1", 4);
+	file_seal(copy, n);
+	assert_int_equal(psr_model_parse(&model, copy, n, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "has flags 2; the last 0 of"));
+	free(copy);
+	copy = copy_of(of_leaning, &n);
+	file_put(entry_of(copy, "DLEN") + ENTRY_LENGTH, 8, 12 * (uint64_t)leaning.n_lean - 1);
+	file_seal(copy, n);
+	assert_int_equal(psr_model_parse(&model, copy, n, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "section DLEN"));
+	free(copy);
+}
+
 /* An older psr, which knows none of these sections, reads the blocks. */
 static void sections_of_points_are_not_required(void **state)
 {
@@ -329,6 +392,7 @@ int main(void)
 		cmocka_unit_test(lies_are_refused),
 		cmocka_unit_test(a_set_of_sections_is_whole),
 		cmocka_unit_test(points_without_their_deltas_are_refused),
+		cmocka_unit_test(leaning_points_without_their_leans_are_refused),
 		cmocka_unit_test(sections_of_points_are_not_required),
 	};
 

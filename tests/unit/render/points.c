@@ -355,6 +355,129 @@ static void points_cast_shadows_and_receive_them(void **state)
 	dpoint_set_fini(&floor);
 }
 
+/* ---- points that lean ---- */
+
+/* How shading's normals lean from the plane z = 0: along x and y, at a place of it. */
+static void lean_at(double lean[2], double x, double y)
+{
+	lean[0] = 0.3 + 0.5 * x - 0.2 * y;
+	lean[1] = -0.1 + 0.4 * x + 0.3 * y;
+}
+
+static void lean_of(struct dpoint_lean *lean, const struct dpoint *p)
+{
+	const double growth[2][2] = { { 0.5, -0.2 }, { 0.4, 0.3 } }, axis[2][2] = { { p->u[0], p->u[1] },
+		                                                                        { -p->u[1], p->u[0] } };
+	double in[2];
+
+	lean_at(in, p->at[0], p->at[1]);
+	for (int c = 0; c < 2; c++) {
+		lean->at[c] = (int16_t)lrint((axis[c][0] * in[0] + axis[c][1] * in[1]) / (double)DPOINT_LEAN_STEP);
+		for (int k = 0; k < 2; k++) {
+			double by = 0;
+
+			for (int i = 0; i < 2; i++)
+				for (int j = 0; j < 2; j++)
+					by += axis[c][i] * growth[i][j] * axis[k][j];
+			lean->by[c][k] = (uint16_t)((psr_bits_from_float((float)by) + 0x8000) >> 16);
+		}
+	}
+}
+
+/* The plane of a floor's points, all of which lean; the caller frees group and lean. */
+static void make_leaning(struct dpoint_set *to, const struct dpoint_set *floor)
+{
+	struct dpoint_group *group = malloc(floor->n_groups * sizeof *group);
+	struct dpoint_lean *lean = malloc(floor->n_points * sizeof *lean);
+
+	*to = *floor;
+	to->n_lean = floor->n_points;
+	to->group = memcpy(group, floor->group, floor->n_groups * sizeof *group);
+	to->lean = lean;
+	for (uint32_t i = 0; i < floor->n_groups; i++) {
+		group[i].flags |= DPOINT_LEANING;
+		for (uint32_t k = 0; k < group[i].n; k++) {
+			struct dpoint p;
+
+			dpoint_unpack(&p, &floor->word[group[i].first + k], &group[i].box);
+			lean_of(&lean[group[i].first + k], &p);
+		}
+	}
+}
+
+/* Half a degree: 0.23 of packed normals, as much again of what turns their tangents, and growth's 8 bits. */
+static void check_normals(const struct drawn *p, const struct psr_camera *camera)
+{
+	unsigned n = 0;
+
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++) {
+			const struct line line = line_of(camera, SIDE, x + 0.5, y + 0.5);
+			const double t = -line.from[2] / line.along[2];
+			double at[3], seen[3], normal[3] = { 0, 0, 1 };
+
+			memcpy(at, line.from, sizeof at);
+			v3d_add_scaled(at, at, t, line.along);
+			if (fmax(fabs(at[0]), fabs(at[1])) > 0.95)
+				continue;
+			lean_at(normal, at[0], at[1]);
+			v3d_normalize(normal, normal);
+			for (int k = 0; k < 3; k++)
+				seen[k] = p->normal[3 * (y * SIDE + x) + k] / 32767.0;
+			n++;
+			assert_true(v3d_dot(seen, normal) > cos(0.5 * 3.14159265358979 / 180));
+		}
+	assert_true(n > SIDE * SIDE / 4);
+}
+
+/* Places are those of the points that do not lean, and so is what a light's shadow asks for: a light that is behind the
+ * plane does not reach it, though normals lean towards the light. */
+static void points_that_lean_have_shadings_normals_in_their_planes(void **state)
+{
+	struct dpoint_set floor, leaning;
+	struct psr_model *model[2];
+	struct revolved plane;
+
+	(void)state;
+	quadric(&plane, 0, 0, 0);
+	points_of_patch(&floor, &plane.patch, 6, POINTS_GREY);
+	make_leaning(&leaning, &floor);
+	model[0] = points_to_model(&floor);
+	model[1] = points_to_model(&leaning);
+	for (int is_perspective = 0; is_perspective < 2; is_perspective++) {
+		const struct psr_instance instance[2] = { place(model[0]), place(model[1]) };
+		struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .color = { 1, 1, 1 }, .casts_shadow = 1,
+			                       .direction = { -1, 0, 0.05 } };
+		struct psr_scene scene = { .instance = &instance[1], .n_instances = 1, .light = &light, .n_lights = 1,
+			                       .camera = camera_of(is_perspective, 0.8) };
+		struct drawn *first = malloc(sizeof *first), *other = malloc(sizeof *other);
+
+		draw_by(first, &scene, &(struct way){ .n_threads = 1, .simd = simd_of(PSR_ISA_C) });
+		check_normals(first, &scene.camera);
+		for (int i = 0; i < SIDE * SIDE; i++)
+			assert_true(!isfinite(first->depth[i]) || first->rgb[3 * i] == 0);
+		for (int i = 0; i < PSR_N_ISAS; i++)
+			for (int n_threads = 1; n_threads <= 3 && simd_of(i) != NULL; n_threads += 2) {
+				draw_by(other, &scene, &(struct way){ .n_threads = n_threads, .simd = simd_of(i) });
+				assert_same(first, other);
+			}
+		scene.instance = &instance[0];
+		draw_by(other, &scene, &(struct way){ .n_threads = 1 });
+		assert_memory_equal(first->depth, other->depth, sizeof first->depth);
+		light.casts_shadow = 0;
+		scene.instance = &instance[1];
+		draw_by(other, &scene, &(struct way){ .n_threads = 1 });
+		assert_true(other->rgb[3 * (SIDE / 2 * SIDE + SIDE / 2)] > 20);
+		free(first);
+		free(other);
+	}
+	psr_model_unref(model[0]);
+	psr_model_unref(model[1]);
+	free((void *)(uintptr_t)leaning.group);
+	free((void *)(uintptr_t)leaning.lean);
+	dpoint_set_fini(&floor);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -364,6 +487,7 @@ int main(void)
 		cmocka_unit_test(backs_are_seen_of_two_sided_groups_alone),
 		cmocka_unit_test(a_floor_has_no_hole_under_the_eye),
 		cmocka_unit_test(points_cast_shadows_and_receive_them),
+		cmocka_unit_test(points_that_lean_have_shadings_normals_in_their_planes),
 	};
 
 	only_threads_under_tsan();

@@ -105,7 +105,7 @@ static void an_open_surface_is_seen_from_the_sides_that_its_material_has(void **
 		mesh->material[0].two_sided = two_sided;
 		make(&set, &info, &report, mesh, 128);
 		for (uint32_t i = 0; i < set.n_groups; i++)
-			assert_int_equal(set.group[i].flags, two_sided ? DPOINT_TWO_SIDED : 0);
+			assert_int_equal(set.group[i].flags & DPOINT_TWO_SIDED, two_sided ? DPOINT_TWO_SIDED : 0);
 		dpoint_set_fini(&set);
 		psr_mesh_destroy(mesh);
 	}

@@ -1,0 +1,275 @@
+#include "lean.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include "base/vec.h"
+#include "bound.h"
+#include "seal.h"
+#include "sealed.h"
+
+#define DEEP 1.0f      /* of options->height: rays get there between slats, and not through the rim of what is bent */
+#define NEAR 4.0f      /* of that depth: a first look */
+#define OPEN 0.25f     /* of options->height: how far tiles reach over an open side; else until they are as far off */
+#define OFF 2          /* likewise: of tiles that are further off, none reaches over more than that */
+#define TRIES 5
+
+/* Of the open rays to a place, leaves out those that lids nearby stop. Returns how many are left. */
+static int stop_rays(uint8_t *open, int n_open, const struct nearby *nearby, const float place[3],
+                     const float (*from)[3])
+{
+	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+		const struct lid *lid = nearby->near[i].lid;
+		float seen[3];
+
+		rectangle_sees(seen, &lid->rectangle, place);
+		n_open = rays_stop(open, n_open, lid, place, seen, from, 0);
+	}
+	return n_open;
+}
+
+/* Whether lids stop all rays that graze a cell's plane on their way to a place behind its middle. Those close by stop
+ * most; of what is left one ray that nothing stops will do. */
+static int is_shut(const struct sealing *s, struct nearby *nearby, uint32_t at)
+{
+	const struct dpoint_cell *cell = &s->surface->cell[at];
+	const float deep = DEEP * s->options->height;
+	float from[AROUND_GRAZING][3], axis[3][3], place[3];
+	uint8_t open[AROUND_GRAZING];
+	int n_open = rays_open(open, AROUND_GRAZING);
+
+	if (!rays_axis(axis, cell))
+		return 1;
+	rays_graze(from, s, (const float (*)[3])axis);
+	dpoint_cell_middle(place, cell);
+	v3f_add_scaled(place, place, -deep, axis[2]);
+	nearby->n = 0;
+	nearby_gather(nearby, s, 0, place, NEAR * deep);
+	n_open = stop_rays(open, n_open, nearby, place, (const float (*)[3])from);
+	if (n_open == 0)
+		return 1;
+	nearby->n = 0;
+	nearby_gather(nearby, s, 0, place, 1.2f * deep / GRAZING);
+	for (int i = 0; i < n_open; i++)
+		if (stop_rays(&open[i], 1, nearby, place, (const float (*)[3])from) > 0)
+			return 0;
+	return 1;
+}
+
+static void set_cells(uint8_t *cells, const struct dpoint_face *face, const struct dpoint_surface *surface)
+{
+	for (uint32_t i = 0; i < face->n_cells; i++)
+		cells[face->first_cell + i] = surface->cell[face->first_cell + i].part != DPOINT_BEYOND;
+}
+
+/* Leaves out candidates whose cells are all of tiled faces. */
+static void leave_out(struct dpoint_choice *choice, const struct dpoint_cover *cover, const uint8_t *is_tiled)
+{
+	for (uint32_t i = 0; i < cover->n_candidates; i++) {
+		int is_due = choice->is_kept[i] && cover->n[i] > 0;
+
+		for (uint32_t k = 0; k < cover->n[i] && is_due; k++) {
+			const struct cell_node *node = &cover->tree->node[cover->list[i][k]];
+
+			for (uint32_t c = node->begin; c < node->end && is_due; c++)
+				is_due = is_tiled[cover->tree->order[c]];
+		}
+		if (is_due) {
+			choice->is_kept[i] = 0;
+			choice->n_kept--;
+		}
+	}
+}
+
+/* How far tiles may reach over sides: is_wide: as far as the next faces bend little. */
+static void reach_over(float beyond[3], const struct dpoint_face *face, const struct dpoint_cover_options *options,
+                       int is_wide)
+{
+	const float height = options->error > 0 ? fminf(options->error, options->height) : options->height;
+
+	for (int i = 0; i < 3; i++)
+		beyond[i] = is_wide && face->bend[i] < 1 ? height / (face->bend[i] + 0.05f) : OPEN * height;
+}
+
+struct tiling_job {
+	struct dpoint_surface *surface;
+	const struct dpoint_cover_options *options;
+	struct bound_view view;
+};
+
+static int are_near(struct tiling_job *job, size_t first)
+{
+	const struct dpoint_surface *surface = job->surface;
+	const struct dpoint_cover_options *options = job->options;
+	const double off = (double)(options->error > 0 ? options->error : OFF * options->height);
+
+	for (size_t i = first; i < surface->n_candidates; i++) {
+		float extent[2];
+
+		dpoint_candidate_extent(extent, &surface->candidate[i], options->sine);
+		if (bound_look(&job->view, &surface->facets, &surface->candidate[i].point, extent, off) != PSR_OK ||
+		    !bound_likely_holds(&job->view, extent, off))
+			return 0;
+	}
+	return 1;
+}
+
+/* What is tiled at once: a face, or two that are one rectangle and look alike. */
+struct tiled {
+	const struct dpoint_face *face, *twin; /* twin: or NULL */
+	int is_plain;  /* all cells are there, and look alike */
+	uint64_t attr; /* of what is plain */
+};
+
+/* Joins the looks of a face's cells. Returns whether all are there. */
+static int join_looks(struct look_range *all, const struct dpoint_face *face, const struct dpoint_surface *surface)
+{
+	for (uint32_t i = face->first_cell; i < face->first_cell + face->n_cells; i++) {
+		struct look_range look;
+
+		if (surface->cell[i].part == DPOINT_BEYOND)
+			return 0;
+		look_range_of(&look, surface->cell[i].attr);
+		look_range_join(all, &look);
+	}
+	return 1;
+}
+
+static struct tiled tiled_of(const struct dpoint_surface *surface, const struct dpoint_face *face, int looks)
+{
+	struct tiled t = { .face = face, .twin = face->twin != UINT32_MAX ? &surface->face[face->twin] : NULL };
+	struct look_range look;
+
+	look_range_of(&look, surface->cell[face->first_cell].attr);
+	if (t.twin != NULL) {
+		struct look_range both = look;
+
+		if (join_looks(&both, face, surface) && join_looks(&both, t.twin, surface) && look_range_width(&both) <= looks) {
+			t.is_plain = 1;
+			t.attr = look_range_middle(&both);
+			return t;
+		}
+		t.twin = NULL;
+	}
+	t.is_plain = join_looks(&look, face, surface) && look_range_width(&look) <= looks;
+	t.attr = look_range_middle(&look);
+	return t;
+}
+
+/* The least of what may be reached over at the sides that both do not share. */
+static float least_beyond(const struct tiled *t, const struct dpoint_cover_options *options, int is_wide)
+{
+	const struct dpoint_face *const of[2] = { t->face, t->twin };
+	float beyond[3], least = INFINITY;
+
+	for (int k = 0; k < 2; k++) {
+		reach_over(beyond, of[k], options, is_wide);
+		for (int i = 1; i < 3; i++)
+			least = fminf(least, beyond[(of[k]->shared + i) % 3]);
+	}
+	return least;
+}
+
+static int put_tiles(struct tiling_job *job, const struct tiled *t, int is_wide, float delta)
+{
+	const struct dpoint_face *face = t->face;
+	float beyond[3];
+	int rc = PSR_OK;
+
+	if (!t->is_plain) {
+		for (uint32_t i = face->first_cell; i < face->first_cell + face->n_cells && rc == PSR_OK; i++)
+			if (job->surface->cell[i].part != DPOINT_BEYOND)
+				rc = tile_cell(job->surface, face, i, job->options);
+		return rc;
+	}
+	if (t->twin != NULL)
+		return tile_rectangle(job->surface, face, least_beyond(t, job->options, is_wide), t->attr, delta);
+	reach_over(beyond, face, job->options, is_wide);
+	return tile_face(job->surface, face, beyond, t->attr, delta);
+}
+
+/* With ever smaller tiles until all are near the surface. Leaves none where an error is asked for that they do not
+ * keep. */
+static int tile(struct tiling_job *job, const struct tiled *t)
+{
+	struct dpoint_surface *surface = job->surface;
+	const size_t n_candidates = surface->n_candidates, n_lean = surface->n_lean;
+	float delta = job->options->delta;
+	int rc = PSR_OK, is_near = 0;
+
+	for (int i = 0; i < TRIES && !is_near && rc == PSR_OK; i++) {
+		surface->n_candidates = n_candidates;
+		surface->n_lean = n_lean;
+		rc = put_tiles(job, t, i == 0, delta);
+		is_near = rc == PSR_OK && are_near(job, n_candidates);
+		if (!t->is_plain || (i == 1 && job->options->error == 0))
+			break;
+		delta *= i > 0 ? 0.5f : 1;
+	}
+	if (job->view.is_failed)
+		return PSR_ERR_MEMORY;
+	if (job->options->error > 0 && !is_near) {
+		surface->n_candidates = n_candidates;
+		surface->n_lean = n_lean;
+	}
+	return rc;
+}
+
+static int has_open(const uint8_t *is_open, const struct dpoint_face *face)
+{
+	return memchr(is_open + face->first_cell, 1, face->n_cells) != NULL;
+}
+
+/* Tiles the faces that are seen through. */
+static int tile_open(struct dpoint_surface *surface, struct dpoint_choice *choice, const struct dpoint_cover *cover,
+                     const struct dpoint_cover_options *options, const uint8_t *is_open)
+{
+	struct tiling_job job = { .surface = surface, .options = options };
+	const size_t before = surface->n_candidates;
+	uint8_t *is_tiled = calloc(surface->n_cells + 1, 1);
+	int rc = is_tiled != NULL ? PSR_OK : PSR_ERR_MEMORY;
+
+	for (uint32_t f = 0; f < surface->n_faces && rc == PSR_OK; f++) {
+		const struct tiled t = tiled_of(surface, &surface->face[f], options->looks);
+		const size_t n = surface->n_candidates;
+
+		if (t.twin != NULL && t.face->twin < f)
+			continue; /* done with that */
+		if (!has_open(is_open, t.face) && (t.twin == NULL || !has_open(is_open, t.twin)))
+			continue;
+		rc = tile(&job, &t);
+		if (surface->n_candidates == n)
+			continue;
+		set_cells(is_tiled, t.face, surface);
+		if (t.twin != NULL)
+			set_cells(is_tiled, t.twin, surface);
+	}
+	bound_view_fini(&job.view);
+	if (rc == PSR_OK && surface->n_candidates > before) {
+		leave_out(choice, cover, is_tiled);
+		rc = keep_added(choice, before, surface->n_candidates);
+	}
+	free(is_tiled);
+	return rc;
+}
+
+int tile_faces(struct dpoint_surface *surface, struct dpoint_choice *choice, const struct dpoint_cover *cover,
+               const struct dpoint_cover_options *options, const struct dpoint_work *work)
+{
+	struct sealing s;
+	int rc;
+
+	if (choice->n_kept == 0 || surface->n_faces == 0)
+		return PSR_OK;
+	sealing_init(&s, surface, options);
+	s.is_closed = is_shut;
+	s.is_open = calloc(surface->n_cells + 1, 1);
+	if (s.is_open == NULL)
+		return PSR_ERR_MEMORY;
+	for (size_t f = 0; f < surface->n_faces; f++)
+		set_cells(s.is_open, &surface->face[f], surface);
+	rc = sealing_look(&s, choice, work);
+	if (rc == PSR_OK)
+		rc = tile_open(surface, choice, cover, options, s.is_open);
+	free(s.is_open);
+	return rc;
+}

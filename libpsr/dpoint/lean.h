@@ -1,0 +1,29 @@
+/* Faces that their normals lean from, covered by points that lie in them: a step of dpoint_simplify(). */
+#ifndef PSR_DPOINT_LEAN_H
+#define PSR_DPOINT_LEAN_H
+
+#include "rectangle.h"
+
+/* [K] has one normal for surface and shading. A mesh of few triangles has two, and rectangles that stand on those of
+ * shading are the slats of a blind: who looks flatter along a face than its normals lean sees between them, or sees all
+ * of them from behind, which is nothing. Such a face gets flat points in its own plane, whose normals lean (struct
+ * dpoint_lean), and points that cover nothing but such faces are left out.
+ * A face is one whose cells let rays through that graze it, to half a sample behind it.
+ * Adds to surface and choice. MEMORY, CANCELLED. */
+int tile_faces(struct dpoint_surface *surface, struct dpoint_choice *choice, const struct dpoint_cover *cover,
+               const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
+/* Adds flat candidates that cover a face, and their leans; what is beyond its sides they may reach over by `beyond`,
+ * by side. attr: theirs. MEMORY. */
+int tile_face(struct dpoint_surface *surface, const struct dpoint_face *face, const float beyond[3], uint64_t attr,
+              float delta);
+
+/* The same of a face and its twin, which are a rectangle. beyond: over any of its sides. MEMORY. */
+int tile_rectangle(struct dpoint_surface *surface, const struct dpoint_face *face, float beyond, uint64_t attr,
+                   float delta);
+
+/* Adds one in a cell's plane, over the cell. MEMORY. */
+int tile_cell(struct dpoint_surface *surface, const struct dpoint_face *face, uint32_t cell,
+              const struct dpoint_cover_options *options);
+
+#endif
