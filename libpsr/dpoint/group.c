@@ -61,7 +61,7 @@ static uint32_t cut(float low[3], float high[3], const struct radix_entry *key, 
 
 static int is_leaning(const struct dpoint_surface *surface, uint32_t candidate)
 {
-	return candidate >= surface->n_candidates - surface->n_lean;
+	return candidate - surface->first_lean < surface->n_lean;
 }
 
 /* Flags, and classes of deltas. */
@@ -163,7 +163,6 @@ static void put_words(struct dpoint_set *set, struct dpoint_group *group, struct
                       struct dpoint_lean *lean, const struct making *m)
 {
 	const struct dpoint_surface *surface = m->grouping->surface;
-	const size_t n_plain = surface->n_candidates - surface->n_lean;
 
 	for (uint32_t i = 0; i < set->n_groups; i++) {
 		const struct radix_entry *first = &m->key[m->cut_group[i].first];
@@ -176,7 +175,7 @@ static void put_words(struct dpoint_set *set, struct dpoint_group *group, struct
 			for (int side = 0; side < 2 && delta != NULL; side++)
 				delta[set->n_points][side] = (uint8_t)dpoint_delta_class(c->delta[side]);
 			if (group[i].flags & DPOINT_LEANING)
-				lean[set->n_lean++] = surface->lean[first[k].value - n_plain];
+				lean[set->n_lean++] = surface->lean[first[k].value - surface->first_lean];
 			dpoint_pack(&word[set->n_points++], &c->point, &group[i].box);
 		}
 	}

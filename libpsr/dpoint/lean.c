@@ -220,14 +220,15 @@ static int has_open(const uint8_t *is_open, const struct dpoint_face *face)
 }
 
 /* Tiles the faces that are seen through. */
-static int tile_open(struct dpoint_surface *surface, struct dpoint_choice *choice, const struct dpoint_cover *cover,
-                     const struct dpoint_cover_options *options, const uint8_t *is_open)
+static int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
+                     const struct dpoint_cover *cover, const struct dpoint_cover_options *options,
+                     const uint8_t *is_open)
 {
 	struct tiling_job job = { .surface = surface, .options = options };
 	const size_t before = surface->n_candidates;
-	uint8_t *is_tiled = calloc(surface->n_cells + 1, 1);
-	int rc = is_tiled != NULL ? PSR_OK : PSR_ERR_MEMORY;
+	int rc = PSR_OK;
 
+	surface->first_lean = before;
 	for (uint32_t f = 0; f < surface->n_faces && rc == PSR_OK; f++) {
 		const struct tiled t = tiled_of(surface, &surface->face[f], options->looks);
 		const size_t n = surface->n_candidates;
@@ -248,12 +249,12 @@ static int tile_open(struct dpoint_surface *surface, struct dpoint_choice *choic
 		leave_out(choice, cover, is_tiled);
 		rc = keep_added(choice, before, surface->n_candidates);
 	}
-	free(is_tiled);
 	return rc;
 }
 
-int tile_faces(struct dpoint_surface *surface, struct dpoint_choice *choice, const struct dpoint_cover *cover,
-               const struct dpoint_cover_options *options, const struct dpoint_work *work)
+int tile_faces(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
+               const struct dpoint_cover *cover, const struct dpoint_cover_options *options,
+               const struct dpoint_work *work)
 {
 	struct sealing s;
 	int rc;
@@ -269,7 +270,7 @@ int tile_faces(struct dpoint_surface *surface, struct dpoint_choice *choice, con
 		set_cells(s.is_open, &surface->face[f], surface);
 	rc = sealing_look(&s, choice, work);
 	if (rc == PSR_OK)
-		rc = tile_open(surface, choice, cover, options, s.is_open);
+		rc = tile_open(is_tiled, surface, choice, cover, options, s.is_open);
 	free(s.is_open);
 	return rc;
 }

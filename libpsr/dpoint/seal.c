@@ -99,7 +99,7 @@ int keep_added(struct dpoint_choice *choice, size_t before, size_t n)
 }
 
 int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
-         const struct dpoint_cover_options *options, const struct dpoint_work *work)
+         const uint8_t *is_tiled, const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
 	const size_t before = surface->n_candidates;
 	struct sealing s;
@@ -113,7 +113,8 @@ int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dp
 	s.over = malloc(surface->n_cells * sizeof *s.over);
 	rc = s.is_open != NULL && s.over != NULL ? PSR_OK : PSR_ERR_MEMORY;
 	if (rc == PSR_OK) {
-		memset(s.is_open, 1, surface->n_cells);
+		for (size_t i = 0; i < surface->n_cells; i++)
+			s.is_open[i] = is_tiled == NULL || !is_tiled[i];
 		find_over(&s, choice, cover);
 		rc = sealing_look(&s, choice, work);
 	}

@@ -123,7 +123,11 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 	const size_t n = surface->n_candidates;
 	int rc;
 
+	uint8_t *is_tiled = calloc(surface->n_cells + 1, 1);
+
 	memset(choice, 0, sizeof *choice);
+	if (is_tiled == NULL)
+		return PSR_ERR_MEMORY;
 	surface->n_candidates = 0;
 	rc = dpoint_cover_init(cover, surface, options, pool, cancel);
 	surface->n_candidates = n;
@@ -136,9 +140,12 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 	if (rc == PSR_OK && psr_is_cancelled(cancel))
 		rc = PSR_ERR_CANCELLED;
 	if (rc == PSR_OK)
-		rc = seal(surface, choice, cover, options, &work);
+		rc = tile_faces(is_tiled, surface, choice, cover, options, &work);
 	if (rc == PSR_OK)
-		rc = tile_faces(surface, choice, cover, options, &work);
+		rc = cover_candidates(cover, surface, options, &work);
+	if (rc == PSR_OK)
+		rc = seal(surface, choice, cover, is_tiled, options, &work);
+	free(is_tiled);
 	if (rc == PSR_OK)
 		paint(surface, choice, cover, options);
 	return rc;

@@ -57,8 +57,8 @@ struct dpoint_surface {
 	struct dpoint_candidate *candidate;
 	size_t n_cells, n_candidates, cells_room, candidates_room;
 	struct dpoint_face *face;   /* of a mesh: those that may be tiled (lean.h) */
-	struct dpoint_lean *lean;   /* of the last n_lean candidates */
-	size_t n_faces, n_lean, faces_room, lean_room;
+	struct dpoint_lean *lean;   /* of the n_lean candidates from first_lean on */
+	size_t n_faces, n_lean, first_lean, faces_room, lean_room;
 	uint64_t n_bad, n_clamped;  /* candidates that were left out; whose curvature was brought to the bound */
 	struct facets facets;       /* of a mesh or a cloud; of other sources there are none */
 	float margin;               /* of its cover's options */
@@ -171,8 +171,8 @@ int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover
 
 void dpoint_choice_fini(struct dpoint_choice *choice);
 
-/* All of it: fits candidates, mends holes, chooses, and keeps or adds points where slanted rays would slip through
- * (seal.h). Candidates come in two turns: of the first, every `sparse`-th at random (1: all), and fewer of those whose
+/* All of it: fits candidates, mends holes, chooses, tiles faces that their normals lean from (lean.h), and keeps or adds
+ * points where slanted rays would slip through (seal.h). Candidates come in two turns: of the first, every `sparse`-th at random (1: all), and fewer of those whose
  * rectangles are many cells wide; then those in cells that none of these covers, and some of those in cells that one
  * alone covers; others are dropped. For candidates that are much closer than their rectangles are wide, which takes so
  * much less time.

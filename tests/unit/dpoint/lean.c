@@ -153,7 +153,7 @@ static void tiles_do_not_come_out_of_the_next_face(void **state)
 	make_roof(&l.roof, 2, 0.25);
 	make(&l, 4 * HEIGHT);
 	assert_true(l.surface.n_lean >= 4);
-	for (size_t i = l.surface.n_candidates - l.surface.n_lean; i < l.surface.n_candidates; i++) {
+	for (size_t i = l.surface.first_lean; i < l.surface.first_lean + l.surface.n_lean; i++) {
 		n += l.choice.is_kept[i];
 		for (int c = 0; c < 4; c++) {
 			float at[3], extent[2];

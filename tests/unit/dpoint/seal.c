@@ -128,13 +128,13 @@ static void check_sealed(const uint8_t *is_two_sided)
 	n_kept = choice.n_kept;
 	for (int side = 0; side < n_sides; side++)
 		assert_true(count_through(&surface, &choice, &options, side) > 0);
-	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
+	assert_int_equal(seal(&surface, &choice, &cover, NULL, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
 	for (int side = 0; side < n_sides; side++)
 		assert_int_equal(count_through(&surface, &choice, &options, side), 0);
 	assert_true(choice.n_kept > n_kept && choice.n_kept < surface.n_candidates);
 	/* And what is whole gets nothing. */
 	n_kept = choice.n_kept;
-	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
+	assert_int_equal(seal(&surface, &choice, &cover, NULL, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
 	assert_int_equal(choice.n_kept, n_kept);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
@@ -210,7 +210,7 @@ static void none_along_a_saddle_does(void **state)
 	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
 	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
 	assert_true(count_along(&surface, &choice, &options, out, r) > 0);
-	assert_int_equal(seal(&surface, &choice, &cover, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
+	assert_int_equal(seal(&surface, &choice, &cover, NULL, &options, &(struct dpoint_work){ NULL, NULL }), PSR_OK);
 	assert_int_equal(count_along(&surface, &choice, &options, out, r), 0);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
