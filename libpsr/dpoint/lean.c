@@ -222,7 +222,7 @@ static int has_open(const uint8_t *is_open, const struct dpoint_face *face)
 /* Tiles the faces that are seen through. */
 static int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
                      const struct dpoint_cover *cover, const struct dpoint_cover_options *options,
-                     const uint8_t *is_open)
+                     const uint8_t *is_open, const struct dpoint_work *work)
 {
 	struct tiling_job job = { .surface = surface, .options = options };
 	const size_t before = surface->n_candidates;
@@ -237,7 +237,7 @@ static int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct d
 			continue; /* done with that */
 		if (!has_open(is_open, t.face) && (t.twin == NULL || !has_open(is_open, t.twin)))
 			continue;
-		rc = tile(&job, &t);
+		rc = psr_is_cancelled(work->cancel) ? PSR_ERR_CANCELLED : tile(&job, &t);
 		if (surface->n_candidates == n)
 			continue;
 		set_cells(is_tiled, t.face, surface);
@@ -270,7 +270,7 @@ int tile_faces(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_
 		set_cells(s.is_open, &surface->face[f], surface);
 	rc = sealing_look(&s, choice, work);
 	if (rc == PSR_OK)
-		rc = tile_open(is_tiled, surface, choice, cover, options, s.is_open);
+		rc = tile_open(is_tiled, surface, choice, cover, options, s.is_open, work);
 	free(s.is_open);
 	return rc;
 }

@@ -18,7 +18,7 @@
 #define AWRY 0.1
 #define NARROW 0.35          /* of what may be reached over: half of what is as wide as any strip is */
 #define SLACK 2e-5           /* that packing moves a place by: half a step of a box of DPOINT_MOST_BOX */
-#define LEAST_ALONG 0.05     /* of a shading normal along that of its face: others are bent up to it */
+#define LEAST_ALONG 0.15     /* of a shading normal along that of its face: others count as that, at 80 degrees or so */
 #define MOST_TURN 4.0        /* of a lean, from the middle of a tile to its end */
 #define MOST_STRIPS 24
 
@@ -51,6 +51,7 @@ static void lean_of(struct dpoint_lean *lean, const struct dpoint_face *face, co
 	double edge[2][3], normal[3] = { 0 }, grow[2][3] = { { 0 } }, across[3], away[3], m[2][2], w[2], det, top;
 	double u[3], n[3], part[3], dot[3];
 
+	memset(lean, 0, sizeof *lean); /* where there is no normal */
 	for (int k = 0; k < 3; k++) {
 		u[k] = p->u[k];
 		n[k] = p->normal[k];
@@ -65,6 +66,8 @@ static void lean_of(struct dpoint_lean *lean, const struct dpoint_face *face, co
 		m[i][1] = v3d_dot(edge[i], across);
 	}
 	det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+	if (!(fabs(det) > 0))
+		return;
 	top = 1 / det;
 	w[0] = (v3d_dot(away, u) * m[1][1] - v3d_dot(away, across) * m[1][0]) * top;
 	w[1] = (v3d_dot(away, across) * m[0][0] - v3d_dot(away, u) * m[0][1]) * top;
@@ -81,10 +84,12 @@ static void lean_of(struct dpoint_lean *lean, const struct dpoint_face *face, co
 	part[0] = v3d_dot(normal, u);
 	part[1] = v3d_dot(normal, across);
 	part[2] = fmax(v3d_dot(normal, n), LEAST_ALONG * v3d_length(normal));
+	if (!(part[2] > 0))
+		return;
 	for (int c = 0; c < 2; c++) {
 		const double *axis = c == 0 ? u : across;
 
-		lean->at[c] = (int16_t)lrint(clamp(part[c] / part[2], -7, 7) / DPOINT_LEAN_STEP);
+		lean->at[c] = (int16_t)lrint(part[c] / part[2] / DPOINT_LEAN_STEP);
 		for (int k = 0; k < 2; k++) {
 			dot[k] = (v3d_dot(grow[k], axis) * part[2] - part[c] * v3d_dot(grow[k], n)) / (part[2] * part[2]);
 			if (fabs(dot[k]) * extent[k] > MOST_TURN) /* over less than the tile */

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include "base/random.h"
 #include "base/vec.h"
-#include "dpoint/dpoint.h"
+#include "dpoint/lean.h"
 #include "lib/blocks.h"
 
 /* 2^-24 */
@@ -229,6 +229,53 @@ static void curvatures_beyond_the_bound_are_brought_to_it(void **state)
 	}
 }
 
+/* A face of three normals that are one, this many degrees off its own, or off its back's: the nearer one counts. Its
+ * points lean by that within half a step of 2^-12 along u and v. Beyond 81 degrees a normal counts as one of 0.15 along
+ * the face's, and leans by 79 at least, the same way. Where there is none nothing leans. */
+static void normals_across_a_face_and_behind_it_lean_as_far_as_words_hold(void **state)
+{
+	static const double degrees[] = { 0, 1e-9, 30, 60, 80, 81, 82, 89.999, 90, 90.001, 120, 180, -1 };
+	const float beyond[3] = { 1e-3f, 1e-3f, 1e-3f };
+
+	(void)state;
+	for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++) {
+		struct dpoint_face face = { .corner = { { 0, 0, 0.5f }, { 0.1f, 0, 0.5f }, { 0, 0.1f, 0.5f } } };
+		const double angle = degrees[i] * PSR_DEGREE, off = fmin(degrees[i], 180 - degrees[i]);
+		const double normal[3] = { 0.6 * sin(angle), 0.8 * sin(angle), degrees[i] < 0 ? 0 : cos(angle) };
+		struct dpoint_surface surface;
+
+		for (int k = 0; k < 9; k++)
+			face.normal[k / 3][k % 3] = degrees[i] < 0 ? 0 : (float)normal[k % 3];
+		dpoint_surface_init(&surface);
+		assert_int_equal(tile_face(&surface, &face, beyond, 0, 0.125f), PSR_OK);
+		assert_true(surface.n_lean > 0 && surface.n_lean == surface.n_candidates);
+		for (size_t t = 0; t < surface.n_lean; t++) {
+			const struct dpoint *p = &surface.candidate[t].point;
+			const struct dpoint_lean *lean = &surface.lean[t];
+			const double x = lean->at[0] * (double)DPOINT_LEAN_STEP, y = lean->at[1] * (double)DPOINT_LEAN_STEP;
+			const double tangent = sqrt(x * x + y * y);
+			float across[3];
+			double along[2];
+
+			v3f_cross(across, p->normal, p->u);
+			for (int k = 0; k < 2; k++)
+				along[k] = x * p->u[k] + y * across[k];
+			for (int k = 0; k < 4; k++)
+				assert_true(dpoint_lean_by(lean->by[k / 2][k % 2]) == 0);
+			/* Packed normals are 0.23 degrees off. */
+			if (degrees[i] < 0)
+				assert_true(tangent == 0);
+			else if (off < 81)
+				assert_true(fabs(atan(tangent) - off * PSR_DEGREE) < 0.25 * PSR_DEGREE + 0x1p-12);
+			else
+				assert_true(atan(tangent) > 79 * PSR_DEGREE && atan(tangent) < 82 * PSR_DEGREE);
+			if (off > 1)
+				assert_true(0.6 * along[0] + 0.8 * along[1] > 0.99 * tangent);
+		}
+		dpoint_surface_fini(&surface);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -242,6 +289,7 @@ int main(void)
 		cmocka_unit_test(saddles_and_cylinders_have_rho_at_its_ends),
 		cmocka_unit_test(what_is_not_finite_makes_no_point),
 		cmocka_unit_test(curvatures_beyond_the_bound_are_brought_to_it),
+		cmocka_unit_test(normals_across_a_face_and_behind_it_lean_as_far_as_words_hold),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
