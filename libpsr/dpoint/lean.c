@@ -9,7 +9,8 @@
 
 #define DEEP 1.0f      /* of options->height: rays get there between slats, and not through the rim of what is bent */
 #define NEAR 4.0f      /* of that depth: a first look */
-#define OPEN 0.25f     /* of options->height: how far tiles reach over an open side; else until they are as far off */
+#define OPEN 0.25f     /* of options->height: how far tiles reach over an open side */
+#define WIDE 3.0f      /* likewise: over others, at most */
 #define OFF 2          /* likewise: of tiles that are further off, none reaches over more than that */
 #define TRIES 5
 
@@ -61,10 +62,11 @@ static void set_cells(uint8_t *cells, const struct dpoint_face *face, const stru
 		cells[face->first_cell + i] = surface->cell[face->first_cell + i].part != DPOINT_BEYOND;
 }
 
-/* Leaves out candidates whose cells are all of tiled faces. */
-static void leave_out(struct dpoint_choice *choice, const struct dpoint_cover *cover, const uint8_t *is_tiled)
+/* Leaves out the first n candidates, those before tiles, whose cells are all of tiled faces. */
+static void leave_out(struct dpoint_choice *choice, const struct dpoint_cover *cover, size_t n,
+                      const uint8_t *is_tiled)
 {
-	for (uint32_t i = 0; i < cover->n_candidates; i++) {
+	for (uint32_t i = 0; i < n; i++) {
 		int is_due = choice->is_kept[i] && cover->n[i] > 0;
 
 		for (uint32_t k = 0; k < cover->n[i] && is_due; k++) {
@@ -80,14 +82,15 @@ static void leave_out(struct dpoint_choice *choice, const struct dpoint_cover *c
 	}
 }
 
-/* How far tiles may reach over sides: is_wide: as far as the next faces bend little. */
+/* How far tiles may reach over sides; is_wide: until the next face bends away by a height, if not too far: normals grow
+ * differently there. */
 static void reach_over(float beyond[3], const struct dpoint_face *face, const struct dpoint_cover_options *options,
                        int is_wide)
 {
 	const float height = options->error > 0 ? fminf(options->error, options->height) : options->height;
 
 	for (int i = 0; i < 3; i++)
-		beyond[i] = is_wide && face->bend[i] < 1 ? height / (face->bend[i] + 0.05f) : OPEN * height;
+		beyond[i] = height * (is_wide && face->bend[i] < 1 ? fminf(WIDE, 1 / (face->bend[i] + 0.05f)) : OPEN);
 }
 
 struct tiling_job {
@@ -214,28 +217,28 @@ static int tile(struct tiling_job *job, const struct tiled *t)
 	return rc;
 }
 
-static int has_open(const uint8_t *is_open, const struct dpoint_face *face)
+static int has_any(const uint8_t *cells, const struct dpoint_face *face)
 {
-	return memchr(is_open + face->first_cell, 1, face->n_cells) != NULL;
+	return memchr(cells + face->first_cell, 1, face->n_cells) != NULL;
 }
 
-/* Tiles the faces that are seen through. */
-static int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
-                     const struct dpoint_cover *cover, const struct dpoint_cover_options *options,
-                     const uint8_t *is_open, const struct dpoint_work *work)
+int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
+              struct dpoint_cover *cover, const struct dpoint_cover_options *options, const uint8_t *is_open,
+              const struct dpoint_work *work)
 {
 	struct tiling_job job = { .surface = surface, .options = options };
 	const size_t before = surface->n_candidates;
 	int rc = PSR_OK;
 
-	surface->first_lean = before;
+	if (surface->n_lean == 0)
+		surface->first_lean = before;
 	for (uint32_t f = 0; f < surface->n_faces && rc == PSR_OK; f++) {
 		const struct tiled t = tiled_of(surface, &surface->face[f], options->looks);
 		const size_t n = surface->n_candidates;
 
-		if (t.twin != NULL && t.face->twin < f)
+		if ((t.twin != NULL && t.face->twin < f) || has_any(is_tiled, t.face))
 			continue; /* done with that */
-		if (!has_open(is_open, t.face) && (t.twin == NULL || !has_open(is_open, t.twin)))
+		if (!has_any(is_open, t.face) && (t.twin == NULL || !has_any(is_open, t.twin)))
 			continue;
 		rc = psr_is_cancelled(work->cancel) ? PSR_ERR_CANCELLED : tile(&job, &t);
 		if (surface->n_candidates == n)
@@ -246,14 +249,14 @@ static int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct d
 	}
 	bound_view_fini(&job.view);
 	if (rc == PSR_OK && surface->n_candidates > before) {
-		leave_out(choice, cover, is_tiled);
+		leave_out(choice, cover, surface->first_lean, is_tiled);
 		rc = keep_added(choice, before, surface->n_candidates);
 	}
-	return rc;
+	return rc == PSR_OK ? cover_candidates(cover, surface, options, work) : rc;
 }
 
 int tile_faces(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
-               const struct dpoint_cover *cover, const struct dpoint_cover_options *options,
+               struct dpoint_cover *cover, const struct dpoint_cover_options *options,
                const struct dpoint_work *work)
 {
 	struct sealing s;

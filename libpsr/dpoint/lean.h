@@ -9,10 +9,16 @@
  * of them from behind, which is nothing. Such a face gets flat points in its own plane, whose normals lean (struct
  * dpoint_lean), and points that cover nothing but such faces are left out.
  * A face is one whose cells let rays through that graze it, to half a sample behind it.
- * Adds to surface and choice; is_tiled, by cell: set for those of the faces. MEMORY, CANCELLED. */
+ * Adds to surface, choice and cover; is_tiled, by cell: set for those of the faces. MEMORY, CANCELLED. */
 int tile_faces(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
-               const struct dpoint_cover *cover, const struct dpoint_cover_options *options,
+               struct dpoint_cover *cover, const struct dpoint_cover_options *options,
                const struct dpoint_work *work);
+
+/* The same of faces that any cell of is set in is_open, and which are not tiled yet. No other candidates may have been
+ * added after tile_faces(). */
+int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_choice *choice,
+              struct dpoint_cover *cover, const struct dpoint_cover_options *options, const uint8_t *is_open,
+              const struct dpoint_work *work);
 
 /* Adds flat candidates that cover a face, and their leans; what is beyond its sides they may reach over by `beyond`,
  * by side. attr: theirs. MEMORY. */

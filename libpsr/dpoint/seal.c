@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include "lean.h"
 #include "sealed.h"
 
 #define CHUNK 512 /* cells */
@@ -99,10 +100,10 @@ int keep_added(struct dpoint_choice *choice, size_t before, size_t n)
 }
 
 int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dpoint_cover *cover,
-         const uint8_t *is_tiled, const struct dpoint_cover_options *options, const struct dpoint_work *work)
+         uint8_t *is_tiled, const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
-	const size_t before = surface->n_candidates;
 	struct sealing s;
+	size_t before;
 	int rc;
 
 	if (choice->n_kept == 0 || surface->is_cloud)
@@ -124,6 +125,12 @@ int seal(struct dpoint_surface *surface, struct dpoint_choice *choice, struct dp
 		rc = keep_over_open(choice, cover, s.is_open);
 	if (rc == PSR_OK)
 		rc = sealing_look(&s, choice, work);
+	if (rc == PSR_OK && is_tiled != NULL) {
+		rc = tile_open(is_tiled, surface, choice, cover, options, s.is_open, work);
+		for (size_t i = 0; i < surface->n_cells; i++)
+			s.is_open[i] &= !is_tiled[i];
+	}
+	before = surface->n_candidates;
 	if (rc == PSR_OK)
 		rc = mend_planes(surface, cover, s.is_open, options, work);
 	if (rc == PSR_OK)

@@ -142,8 +142,6 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 	if (rc == PSR_OK)
 		rc = tile_faces(is_tiled, surface, choice, cover, options, &work);
 	if (rc == PSR_OK)
-		rc = cover_candidates(cover, surface, options, &work);
-	if (rc == PSR_OK)
 		rc = seal(surface, choice, cover, is_tiled, options, &work);
 	free(is_tiled);
 	if (rc == PSR_OK)
