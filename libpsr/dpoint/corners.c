@@ -113,35 +113,17 @@ static size_t list_edges(struct edge *edge, const struct corners *c, uint32_t n_
 	return n;
 }
 
-static void bend_edge(struct corners *c, const struct psr_mesh *mesh, const struct edge pair[2])
-{
-	float normal[2][3], cosine, sine;
-
-	for (int i = 0; i < 2; i++)
-		face_normal(normal[i], mesh, mesh->triangle[pair[i].index / 3]);
-	cosine = v3f_dot(normal[0], normal[1]);
-	sine = cosine > 0 ? sqrtf(fmaxf(0, 1 - cosine * cosine)) : 1;
-	for (int i = 0; i < 2; i++) {
-		c->bend[pair[i].index] = sine;
-		c->next[pair[i].index] = pair[1 - i].index;
-	}
-}
-
-static size_t find_open(struct corners *c, struct edge *edge, size_t n, const struct psr_mesh *mesh)
+static size_t find_open(struct corners *c, struct edge *edge, size_t n)
 {
 	size_t n_single = 0;
 
-	for (uint32_t i = 0; i < 3 * mesh->n_triangles; i++) {
-		c->bend[i] = 1;
-		c->next[i] = UINT32_MAX;
-	}
 	for (size_t i = 0, next; i < n; i = next) {
 		for (next = i + 1; next < n && edge[next].ends == edge[i].ends;)
 			next++;
 		if (next == i + 1)
 			c->is_open[edge[i].index / 3] |= (uint8_t)(1 << edge[i].index % 3);
-		else if (next == i + 2)
-			bend_edge(c, mesh, &edge[i]);
+		for (int k = 0; k < 2 && next == i + 2; k++)
+			c->next[edge[i + (size_t)k].index] = edge[i + 1 - (size_t)k].index;
 		edge[n_single++] = edge[i];
 	}
 	return n_single;
@@ -225,14 +207,14 @@ int corners_init(struct corners *c, const struct psr_mesh *mesh, const struct dp
 	c->of = malloc((n + 1) * sizeof *c->of);
 	c->corner = malloc((n + 1) * sizeof *c->corner);
 	c->is_open = calloc((size_t)mesh->n_triangles + 1, 1);
-	c->bend = malloc((n + 1) * sizeof *c->bend);
 	c->next = malloc((n + 1) * sizeof *c->next);
 	if (key != NULL && edge != NULL && c->of != NULL && c->corner != NULL && c->is_open != NULL &&
-	    c->bend != NULL && c->next != NULL) {
+	    c->next != NULL) {
+		memset(c->next, 0xff, n * sizeof *c->next);
 		make_keys(key, mesh);
 		qsort(key, n, sizeof *key, compare_keys);
 		name_corners(c, key, n, options);
-		rc = bend_all(c, edge, find_open(c, edge, list_edges(edge, c, mesh->n_triangles), mesh));
+		rc = bend_all(c, edge, find_open(c, edge, list_edges(edge, c, mesh->n_triangles)));
 	}
 	free(key);
 	free(edge);
@@ -244,7 +226,19 @@ void corners_fini(struct corners *c)
 	free(c->corner);
 	free(c->of);
 	free(c->is_open);
-	free(c->bend);
 	free(c->next);
 	memset(c, 0, sizeof *c);
+}
+
+float corners_bend(const struct corners *c, const struct psr_mesh *mesh, uint32_t triangle, int edge)
+{
+	const uint32_t next = c->next[3 * (size_t)triangle + (size_t)edge];
+	float normal[2][3], cosine;
+
+	if (next == UINT32_MAX)
+		return 1;
+	face_normal(normal[0], mesh, mesh->triangle[triangle]);
+	face_normal(normal[1], mesh, mesh->triangle[next / 3]);
+	cosine = v3f_dot(normal[0], normal[1]);
+	return cosine > 0 ? sqrtf(fmaxf(0, 1 - cosine * cosine)) : 1;
 }

@@ -15,13 +15,16 @@ struct corners {
 	uint32_t n, n_bad;
 	uint32_t *of;      /* of each triangle's three corners */
 	uint8_t *is_open;  /* bit i of a triangle: the edge from its corner i to the next */
-	float *bend;       /* of each triangle's three edges: the sine of the angle to the next face; 1 from a right one on,
-	                    * and where the edge is open, or of more than two */
-	uint32_t *next;    /* which edge of another triangle it is, 3 * triangle + edge; UINT32_MAX: of none, or of several */
+	uint32_t *next;    /* of each triangle's three edges: which one of another triangle it is, 3 * triangle + edge;
+	                    * UINT32_MAX: of none, or of several */
 };
 
 int corners_init(struct corners *corners, const struct psr_mesh *mesh,
                  const struct dpoint_mesh_options *options); /* MEMORY; corners_fini() even then */
 void corners_fini(struct corners *corners);
+
+/* Returns the sine of the angle at which the next face goes on from a triangle's edge: 1 from a right one on, and where
+ * there is no such face. */
+float corners_bend(const struct corners *corners, const struct psr_mesh *mesh, uint32_t triangle, int edge);
 
 #endif

@@ -1,5 +1,6 @@
 #include "lean.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
@@ -13,19 +14,66 @@
 #define WIDE 3.0f      /* likewise: over others, at most */
 #define OFF 2          /* likewise: of tiles that are further off, none reaches over more than that */
 #define TRIES 5
+#define LEAST_ALONG 0.15     /* of a shading normal along that of its face: others count as that, at 80 degrees or so */
+#define MOST_TURN 4.0        /* of a lean, from the middle of a tile to its end */
 
-/* Of the open rays to a place, leaves out those that lids nearby stop. Returns how many are left. */
-static int stop_rays(uint8_t *open, int n_open, const struct nearby *nearby, const float place[3],
-                     const float (*from)[3])
+static double clamp(double x, double low, double high)
 {
-	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
-		const struct lid *lid = nearby->near[i].lid;
-		float seen[3];
+	return fmin(fmax(x, low), high);
+}
 
-		rectangle_sees(seen, &lid->rectangle, place);
-		n_open = rays_stop(open, n_open, lid, place, seen, from, 0);
+void lean_make(struct dpoint_lean *lean, const struct dpoint_face *face, const struct dpoint_candidate *of)
+{
+	const struct dpoint *p = &of->point;
+	double edge[2][3], normal[3] = { 0 }, grow[2][3] = { { 0 } }, across[3], away[3], m[2][2], w[2], det, top;
+	double u[3], n[3], part[3], dot[3];
+
+	memset(lean, 0, sizeof *lean); /* where there is no normal */
+	for (int k = 0; k < 3; k++) {
+		u[k] = p->u[k];
+		n[k] = p->normal[k];
+		edge[0][k] = (double)face->corner[1][k] - face->corner[0][k];
+		edge[1][k] = (double)face->corner[2][k] - face->corner[0][k];
+		away[k] = (double)p->at[k] - face->corner[0][k];
 	}
-	return n_open;
+	v3d_cross(across, n, u);
+	/* Corners' weights of a place: those of the middle, and how they grow along u and v. */
+	for (int i = 0; i < 2; i++) {
+		m[i][0] = v3d_dot(edge[i], u);
+		m[i][1] = v3d_dot(edge[i], across);
+	}
+	det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+	if (!(fabs(det) > 0))
+		return;
+	top = 1 / det;
+	w[0] = (v3d_dot(away, u) * m[1][1] - v3d_dot(away, across) * m[1][0]) * top;
+	w[1] = (v3d_dot(away, across) * m[0][0] - v3d_dot(away, u) * m[0][1]) * top;
+	/* A tile over what is much narrower has its middle far beyond that; in a twin it is within -1. */
+	w[0] = clamp(w[0], -1, 2);
+	w[1] = clamp(w[1], -1, 2);
+	for (int k = 0; k < 3; k++) {
+		const double at[3] = { face->normal[0][k], face->normal[1][k], face->normal[2][k] };
+
+		normal[k] = at[0] + w[0] * (at[1] - at[0]) + w[1] * (at[2] - at[0]);
+		grow[0][k] = (m[1][1] * (at[1] - at[0]) - m[0][1] * (at[2] - at[0])) * top;
+		grow[1][k] = (m[0][0] * (at[2] - at[0]) - m[1][0] * (at[1] - at[0])) * top;
+	}
+	part[0] = v3d_dot(normal, u);
+	part[1] = v3d_dot(normal, across);
+	part[2] = fmax(v3d_dot(normal, n), LEAST_ALONG * v3d_length(normal));
+	if (!(part[2] > 0))
+		return;
+	for (int c = 0; c < 2; c++) {
+		const double *axis = c == 0 ? u : across;
+
+		lean->at[c] = (int16_t)lrint(part[c] / part[2] / DPOINT_LEAN_STEP);
+		for (int k = 0; k < 2; k++) {
+			dot[k] = (v3d_dot(grow[k], axis) * part[2] - part[c] * v3d_dot(grow[k], n)) / (part[2] * part[2]);
+			if (fabs(dot[k]) * of->delta[k] > MOST_TURN) /* over less than the tile */
+				dot[k] = 0;
+			lean->by[c][k] = (uint16_t)((psr_bits_from_float((float)clamp(dot[k], -1e6, 1e6)) + 0x8000) >> 16);
+		}
+	}
 }
 
 /* Whether lids stop all rays that graze a cell's plane on their way to a place behind its middle. Those close by stop
@@ -45,13 +93,13 @@ static int is_shut(const struct sealing *s, struct nearby *nearby, uint32_t at)
 	v3f_add_scaled(place, place, -deep, axis[2]);
 	nearby->n = 0;
 	nearby_gather(nearby, s, 0, place, NEAR * deep);
-	n_open = stop_rays(open, n_open, nearby, place, (const float (*)[3])from);
+	n_open = rays_stop_by(open, n_open, nearby, place, (const float (*)[3])from, 0);
 	if (n_open == 0)
 		return 1;
 	nearby->n = 0;
 	nearby_gather(nearby, s, 0, place, 1.2f * deep / GRAZING);
 	for (int i = 0; i < n_open; i++)
-		if (stop_rays(&open[i], 1, nearby, place, (const float (*)[3])from) > 0)
+		if (rays_stop_by(&open[i], 1, nearby, place, (const float (*)[3])from, 0) > 0)
 			return 0;
 	return 1;
 }
@@ -262,7 +310,7 @@ int tile_faces(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_
 	struct sealing s;
 	int rc;
 
-	if (choice->n_kept == 0 || surface->n_faces == 0)
+	if (choice->n_kept == 0)
 		return PSR_OK;
 	sealing_init(&s, surface, options);
 	s.is_closed = is_shut;

@@ -20,6 +20,9 @@ int tile_open(uint8_t *is_tiled, struct dpoint_surface *surface, struct dpoint_c
               struct dpoint_cover *cover, const struct dpoint_cover_options *options, const uint8_t *is_open,
               const struct dpoint_work *work);
 
+/* Finds how the normals between a face's corners lean from a flat candidate. Where there is none it does not. */
+void lean_make(struct dpoint_lean *lean, const struct dpoint_face *face, const struct dpoint_candidate *of);
+
 /* Adds flat candidates that cover a face, and their leans; what is beyond its sides they may reach over by `beyond`,
  * by side. attr: theirs. MEMORY. */
 int tile_face(struct dpoint_surface *surface, const struct dpoint_face *face, const float beyond[3], uint64_t attr,

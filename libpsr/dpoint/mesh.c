@@ -128,13 +128,18 @@ static int put_pieces_as_facets(struct dpoint_surface *surface, struct dpoint_su
 	return rc;
 }
 
+static void floats_of(float corner[3][3], const struct cutting *c)
+{
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			corner[i][k] = (float)c->corner[i]->at[k];
+}
+
 static int put_facet(struct dpoint_surface *surface, const struct cutting *c)
 {
 	float corner[3][3];
 
-	for (int i = 0; i < 3; i++)
-		for (int k = 0; k < 3; k++)
-			corner[i][k] = (float)c->corner[i]->at[k];
+	floats_of(corner, c);
 	return facets_add(&surface->facets, corner[0], corner[1], corner[2]);
 }
 
@@ -172,7 +177,8 @@ static double slit_of(const struct cutting *c, const double normal[3])
 }
 
 /* Adds the triangle to the faces if its normals lean from it; first: its first cell. */
-static int put_face(const struct cutting *c, const float bend[3], size_t first)
+static int put_face(const struct cutting *c, const struct corners *corners, const struct psr_mesh *mesh,
+                    size_t first)
 {
 	const float slit = c->options->cover != NULL ? c->options->cover->slit : 0;
 	struct dpoint_face *face;
@@ -187,12 +193,11 @@ static int put_face(const struct cutting *c, const float bend[3], size_t first)
 	face = &c->surface->face[c->surface->n_faces++];
 	*face = (struct dpoint_face){ .part = c->material, .first_cell = (uint32_t)first,
 		                          .n_cells = (uint32_t)(c->surface->n_cells - first), .twin = UINT32_MAX };
+	floats_of(face->corner, c);
 	for (int i = 0; i < 3; i++) {
-		for (int k = 0; k < 3; k++) {
-			face->corner[i][k] = (float)c->corner[i]->at[k];
+		for (int k = 0; k < 3; k++)
 			face->normal[i][k] = (float)c->corner[i]->normal[k];
-		}
-		face->bend[i] = bend[i];
+		face->bend[i] = corners_bend(corners, mesh, c->triangle, i);
 	}
 	return PSR_OK;
 }
@@ -256,7 +261,7 @@ static int put_cells(struct cutting *c, const struct corners *corners, const str
 		cut_plan(c, corners->is_open[t]);
 		rc = cut(c);
 		if (rc == PSR_OK)
-			rc = put_face(c, &corners->bend[3 * (size_t)t], first);
+			rc = put_face(c, corners, mesh, first);
 		if (c->surface->n_faces > n_faces)
 			face_of[t] = (uint32_t)n_faces;
 		for (int i = 0; i < 3 && rc == PSR_OK; i++)

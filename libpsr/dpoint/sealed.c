@@ -59,6 +59,19 @@ int rays_stop(uint8_t *open, int n_open, const struct lid *lid, const float at[3
 	return n;
 }
 
+int rays_stop_by(uint8_t *open, int n_open, const struct nearby *nearby, const float at[3], const float (*from)[3],
+                 float behind)
+{
+	for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
+		const struct lid *lid = nearby->near[i].lid;
+		float seen[3];
+
+		rectangle_sees(seen, &lid->rectangle, at);
+		n_open = rays_stop(open, n_open, lid, at, seen, from, behind);
+	}
+	return n_open;
+}
+
 int rays_open(uint8_t *open, int n)
 {
 	for (int d = 0; d < n; d++)
@@ -241,15 +254,10 @@ static int stops_along(const struct sealing *s, const struct nearby *nearby, con
 {
 	for (int p = 0; p < PLACES; p++) {
 		uint8_t open[ALONG_SADDLE];
-		int n_open = rays_open(open, ALONG_SADDLE);
-		float place[3], seen[3];
+		float place[3];
 
 		place_of(place, cell, middle, p);
-		for (size_t i = 0; i < nearby->n && n_open > 0; i++) {
-			rectangle_sees(seen, &nearby->near[i].lid->rectangle, place);
-			n_open = rays_stop(open, n_open, nearby->near[i].lid, place, seen, from, GRAZED * s->behind);
-		}
-		if (n_open > 0)
+		if (rays_stop_by(open, rays_open(open, ALONG_SADDLE), nearby, place, from, GRAZED * s->behind) > 0)
 			return 0;
 	}
 	return 1;

@@ -57,6 +57,10 @@ int rays_open(uint8_t *open, int n);
 int rays_stop(uint8_t *open, int n_open, const struct lid *lid, const float at[3], const float p[3],
               const float (*from)[3], float behind);
 
+/* The same of all lids nearby. */
+int rays_stop_by(uint8_t *open, int n_open, const struct nearby *nearby, const float at[3], const float (*from)[3],
+                 float behind);
+
 /* Whether the lids stop all rays that are looked at to a cell (seal.h). */
 int is_sealed(const struct sealing *s, struct nearby *nearby, uint32_t at);
 

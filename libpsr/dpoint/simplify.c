@@ -121,13 +121,10 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 {
 	const struct dpoint_work work = { pool, cancel };
 	const size_t n = surface->n_candidates;
+	uint8_t *is_tiled = NULL; /* by cell; only where there are faces to tile */
 	int rc;
 
-	uint8_t *is_tiled = calloc(surface->n_cells + 1, 1);
-
 	memset(choice, 0, sizeof *choice);
-	if (is_tiled == NULL)
-		return PSR_ERR_MEMORY;
 	surface->n_candidates = 0;
 	rc = dpoint_cover_init(cover, surface, options, pool, cancel);
 	surface->n_candidates = n;
@@ -139,8 +136,10 @@ int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, st
 		rc = dpoint_choose(choice, cover);
 	if (rc == PSR_OK && psr_is_cancelled(cancel))
 		rc = PSR_ERR_CANCELLED;
-	if (rc == PSR_OK)
-		rc = tile_faces(is_tiled, surface, choice, cover, options, &work);
+	if (rc == PSR_OK && surface->n_faces > 0) {
+		is_tiled = calloc(surface->n_cells, 1);
+		rc = is_tiled == NULL ? PSR_ERR_MEMORY : tile_faces(is_tiled, surface, choice, cover, options, &work);
+	}
 	if (rc == PSR_OK)
 		rc = seal(surface, choice, cover, is_tiled, options, &work);
 	free(is_tiled);

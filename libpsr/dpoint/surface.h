@@ -172,10 +172,10 @@ int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover
 void dpoint_choice_fini(struct dpoint_choice *choice);
 
 /* All of it: fits candidates, mends holes, chooses, tiles faces that their normals lean from (lean.h), and keeps or adds
- * points where slanted rays would slip through (seal.h). Candidates come in two turns: of the first, every `sparse`-th at random (1: all), and fewer of those whose
- * rectangles are many cells wide; then those in cells that none of these covers, and some of those in cells that one
- * alone covers; others are dropped. For candidates that are much closer than their rectangles are wide, which takes so
- * much less time.
+ * points where slanted rays would slip through (seal.h). Candidates come in two turns: of the first, every `sparse`-th
+ * at random (1: all), and fewer of those whose rectangles are many cells wide; then those in cells that none of these
+ * covers, and some of those in cells that one alone covers; others are dropped. For candidates that are much closer than
+ * their rectangles are wide, which takes so much less time.
  * MEMORY, CANCELLED; the caller ends cover and choice even then. */
 int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
                     const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool,

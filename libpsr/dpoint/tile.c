@@ -18,8 +18,6 @@
 #define AWRY 0.1
 #define NARROW 0.35          /* of what may be reached over: half of what is as wide as any strip is */
 #define SLACK 2e-5           /* that packing moves a place by: half a step of a box of DPOINT_MOST_BOX */
-#define LEAST_ALONG 0.15     /* of a shading normal along that of its face: others count as that, at 80 degrees or so */
-#define MOST_TURN 4.0        /* of a lean, from the middle of a tile to its end */
 #define MOST_STRIPS 24
 
 struct side {
@@ -39,66 +37,6 @@ struct tiling {
 	double normal[3];
 };
 
-static double clamp(double x, double low, double high)
-{
-	return fmin(fmax(x, low), high);
-}
-
-/* How the normals between a face's corners lean from a point. */
-static void lean_of(struct dpoint_lean *lean, const struct dpoint_face *face, const struct dpoint *p,
-                    const float extent[2])
-{
-	double edge[2][3], normal[3] = { 0 }, grow[2][3] = { { 0 } }, across[3], away[3], m[2][2], w[2], det, top;
-	double u[3], n[3], part[3], dot[3];
-
-	memset(lean, 0, sizeof *lean); /* where there is no normal */
-	for (int k = 0; k < 3; k++) {
-		u[k] = p->u[k];
-		n[k] = p->normal[k];
-		edge[0][k] = (double)face->corner[1][k] - face->corner[0][k];
-		edge[1][k] = (double)face->corner[2][k] - face->corner[0][k];
-		away[k] = (double)p->at[k] - face->corner[0][k];
-	}
-	v3d_cross(across, n, u);
-	/* Corners' weights of a place: those of the middle, and how they grow along u and v. */
-	for (int i = 0; i < 2; i++) {
-		m[i][0] = v3d_dot(edge[i], u);
-		m[i][1] = v3d_dot(edge[i], across);
-	}
-	det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-	if (!(fabs(det) > 0))
-		return;
-	top = 1 / det;
-	w[0] = (v3d_dot(away, u) * m[1][1] - v3d_dot(away, across) * m[1][0]) * top;
-	w[1] = (v3d_dot(away, across) * m[0][0] - v3d_dot(away, u) * m[0][1]) * top;
-	/* A tile over what is much narrower has its middle far beyond that; in a twin it is within -1. */
-	w[0] = clamp(w[0], -1, 2);
-	w[1] = clamp(w[1], -1, 2);
-	for (int k = 0; k < 3; k++) {
-		const double of[3] = { face->normal[0][k], face->normal[1][k], face->normal[2][k] };
-
-		normal[k] = of[0] + w[0] * (of[1] - of[0]) + w[1] * (of[2] - of[0]);
-		grow[0][k] = (m[1][1] * (of[1] - of[0]) - m[0][1] * (of[2] - of[0])) * top;
-		grow[1][k] = (m[0][0] * (of[2] - of[0]) - m[1][0] * (of[1] - of[0])) * top;
-	}
-	part[0] = v3d_dot(normal, u);
-	part[1] = v3d_dot(normal, across);
-	part[2] = fmax(v3d_dot(normal, n), LEAST_ALONG * v3d_length(normal));
-	if (!(part[2] > 0))
-		return;
-	for (int c = 0; c < 2; c++) {
-		const double *axis = c == 0 ? u : across;
-
-		lean->at[c] = (int16_t)lrint(part[c] / part[2] / DPOINT_LEAN_STEP);
-		for (int k = 0; k < 2; k++) {
-			dot[k] = (v3d_dot(grow[k], axis) * part[2] - part[c] * v3d_dot(grow[k], n)) / (part[2] * part[2]);
-			if (fabs(dot[k]) * extent[k] > MOST_TURN) /* over less than the tile */
-				dot[k] = 0;
-			lean->by[c][k] = (uint16_t)((psr_bits_from_float((float)clamp(dot[k], -1e6, 1e6)) + 0x8000) >> 16);
-		}
-	}
-}
-
 static int put_point(struct tiling *t, const struct dpoint_candidate *made)
 {
 	struct dpoint_surface *s = t->surface;
@@ -107,7 +45,7 @@ static int put_point(struct tiling *t, const struct dpoint_candidate *made)
 	if (candidate == NULL || !ARRAY_ROOM(s->lean, s->n_lean, s->lean_room))
 		return PSR_ERR_MEMORY;
 	*candidate = *made;
-	lean_of(&s->lean[s->n_lean++], t->face, &candidate->point, candidate->delta);
+	lean_make(&s->lean[s->n_lean++], t->face, candidate);
 	return PSR_OK;
 }
 

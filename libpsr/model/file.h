@@ -57,6 +57,11 @@ enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS,
 	              SECTION_CALIBRATION_FINE = 41, SECTION_ONE_MATERIAL, SECTION_DELTAS, SECTION_LEAN,
 	              SECTION_POINT_LEAN, N_KNOWN_SECTIONS };
 
+static inline int section_is_of_points(int id)
+{
+	return id == SECTION_DELTAS || id == SECTION_POINT_LEAN || (id >= SECTION_POINTS && id < SECTION_FIRST_OF_SCAN);
+}
+
 struct section_spec {
 	char type[5];
 	uint16_t version, flags;

@@ -134,7 +134,7 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 
 	if (k == SECTION_CALIBRATION_FINE)
 		return !content->has_blocks;
-	if (k == SECTION_DELTAS || k == SECTION_POINT_LEAN || (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN))
+	if (section_is_of_points((int)k))
 		return !content->has_points;
 	if ((k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE) || k >= SECTION_FIRST_OF_SCAN)
 		return !content->has_octree;

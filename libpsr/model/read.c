@@ -105,9 +105,7 @@ static int check_set(const struct reader *r, const struct content *content)
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const int is_of_blocks = k < SECTION_OCTREE || k == SECTION_CALIBRATION_FINE;
-		const int is_of_points = k == SECTION_DELTAS || k == SECTION_POINT_LEAN ||
-		                         (k >= SECTION_POINTS && k < SECTION_FIRST_OF_SCAN);
-		const char *first = is_of_blocks ? "BLKS" : is_of_points ? "DPNT" : "OCTR";
+		const char *first = is_of_blocks ? "BLKS" : section_is_of_points(k) ? "DPNT" : "OCTR";
 
 		if (section_is_foreign(spec, content) && r->entry[k] >= 0)
 			return bad(r, "section %s is there, and %s, which tells its length, is missing", spec->type, first);

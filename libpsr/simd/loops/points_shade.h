@@ -4,6 +4,7 @@
 
 #include "points_unpack.h"
 #include "simd/strip.h"
+#include "strip_parts.h"
 
 _Static_assert(STRIP <= POINTS_BATCH && STRIP_PADDING <= POINTS_VECTOR, "a strip's points are a batch");
 
@@ -109,19 +110,10 @@ static inline void add_lean(float n[2], const struct dpoint_lean *lean, const fl
 		        + (dpoint_lean_by(lean->by[c][0]) * local[0] + dpoint_lean_by(lean->by[c][1]) * local[1]);
 }
 
-/* Surface normals are shading's. */
-static inline void strip_copy_normals(struct strip *strip, uint32_t first, uint32_t end)
-{
-	memcpy(strip->gx + first, strip->nx + first, (end - first) * sizeof *strip->nx);
-	memcpy(strip->gy + first, strip->ny + first, (end - first) * sizeof *strip->ny);
-	memcpy(strip->gz + first, strip->nz + first, (end - first) * sizeof *strip->nz);
-}
-
 /* Surface normals of points that lean are those of their planes. */
 static void find_planes(struct strip *strip, const struct points_runs *of, const float turn[3][3], uint32_t first,
                         uint32_t end)
 {
-	strip_copy_normals(strip, first, end);
 	for (uint32_t i = first; i < end; i++) {
 		const float x = of->axis[2][0][i], y = of->axis[2][1][i], z = of->axis[2][2][i];
 
@@ -146,7 +138,7 @@ static inline __attribute__((always_inline)) void resolve_runs(struct strip *str
 	float depth[STRIP];
 
 	for (uint32_t i = first; i < end; i++)
-		depth[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
+		depth[i] = psr_word_z(p->word[p->x[i]]);
 	for (uint32_t i = first; i < end; i++) {
 		const float x = (float)(int32_t)(p->x0 + p->x[i]) + 0.5f - center_x, z = depth[i];
 		const float wide = psr_choose(perspective, z, 1);
@@ -183,12 +175,9 @@ static void points_resolve(struct strip *strip, const struct strip_view *view, c
 		resolve_runs(strip, view, in, &of, first, end, 1);
 	else
 		resolve_runs(strip, view, in, &of, first, end, 0);
-	if (!(view->needs & (STRIP_POSITION | STRIP_TWO_SIDED)))
-		return;
+	strip_copy_normals(strip, view, first, end);
 	if (of.has_lean)
 		find_planes(strip, &of, in->turn, first, end);
-	else
-		strip_copy_normals(strip, first, end);
 }
 
 #endif

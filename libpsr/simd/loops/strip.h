@@ -151,7 +151,7 @@ static void locate(struct strip *strip, const struct strip_view *view)
 	const float y = ((float)p->y + 0.5f - view->half_height) / view->focal;
 
 	for (uint32_t i = 0; i < strip->n; i++)
-		strip->pz[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
+		strip->pz[i] = psr_word_z(p->word[p->x[i]]);
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) / view->focal;
 		const float w = psr_choose(view->perspective, strip->pz[i], 1);
@@ -301,7 +301,6 @@ static void ewa_resolve(struct strip *strip, const struct strip_view *view, uint
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const struct strip_pixels *p = strip->pixels;
-	const int has_surface = (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED)) != 0;
 	const uint32_t n = strip->n;
 
 	if (view->lit && !strip->is_specular) {
@@ -326,8 +325,8 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			ewa_resolve(strip, view, first, end);
 		if (p->has_cones)
 			straighten(strip, in->turn, first, end);
-		else if (has_surface)
-			strip_copy_normals(strip, first, end);
+		else
+			strip_copy_normals(strip, view, first, end);
 	}
 	for (uint32_t i = 0; i < n; i++)
 		strip->lr[i] = strip->lg[i] = strip->lb[i] = 0;

@@ -2,6 +2,7 @@
 #ifndef PSR_SIMD_STRIP_PARTS_H
 #define PSR_SIMD_STRIP_PARTS_H
 
+#include <string.h>
 #include "base/srgb.h"
 #include "simd/strip.h"
 
@@ -27,6 +28,16 @@ static inline void repeat_last(struct strip_pixels *p)
 		if (p->has_cones)
 			p->cone[i] = p->cone[p->n - 1];
 	}
+}
+
+/* Surface normals are shading's, where any are asked for. */
+static inline void strip_copy_normals(struct strip *strip, const struct strip_view *view, uint32_t first, uint32_t end)
+{
+	if (!(view->needs & (STRIP_POSITION | STRIP_TWO_SIDED)))
+		return;
+	memcpy(strip->gx + first, strip->nx + first, (end - first) * sizeof *strip->nx);
+	memcpy(strip->gy + first, strip->ny + first, (end - first) * sizeof *strip->ny);
+	memcpy(strip->gz + first, strip->nz + first, (end - first) * sizeof *strip->nz);
 }
 
 /* *all and *common: all attributes or-ed, and and-ed. */
