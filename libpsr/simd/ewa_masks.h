@@ -34,6 +34,14 @@ extern const uint8_t ewa_weight[EWA_BYTES + EWA_BEYOND];
 /* By size, shape and sector: a pixel of this weight is the leaf's own, others' colours are mixed with it alone. */
 extern const uint8_t ewa_core[EWA_MASKS];
 
+/* The pixels of cores that reach EWA_CORE_RADIUS pixels at most, of masks up to size EWA_NARROW: bit EWA_CORE_SIDE * row
+ * + column, of which the middle one is EWA_CORE_RADIUS in both. */
+#define EWA_NARROW 6
+#define EWA_CORE_RADIUS 2
+#define EWA_CORE_SIDE EWA_SIDE(EWA_CORE_RADIUS)
+#define EWA_NARROW_MASKS ((EWA_NARROW + 1) * EWA_SHAPES * EWA_SECTORS)
+extern const uint32_t ewa_core_bits[EWA_NARROW_MASKS];
+
 /* For edges beyond the sizes: 255 exp(-q / 2) in the middle of steps of q, 1 / EWA_STEPS each, up to EWA_MOST_SQUARE. */
 #define EWA_STEPS 32
 #define EWA_MOST_SQUARE 6.25f

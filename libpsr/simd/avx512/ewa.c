@@ -41,140 +41,262 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 	l->n += n;
 }
 
-/* The columns of a mask, 16 lanes from its first one on, that are in the tile. */
-static inline __mmask16 columns_of(const struct ewa_one *one, const struct ewa_part *part)
-{
-	const int32_t first = one->x - one->radius;
-	const uint32_t before = _bzhi_u32(0xffff, (uint32_t)(part->x0 - first));
+/* ---- masks ----
+ *
+ * A vector has 16 pixels: of one row, or eight each of two. Rows are parted alike for all splats, words by four and
+ * sums by two, and stored whole: a load that overlaps the store before it, and is not of the same piece, has to wait.
+ * Outside of the mask sums get a weight of 0. */
 
-	return (__mmask16)(_bzhi_u32(0xffff, (uint32_t)(part->x1 - first)) & ~before);
+/* Where a mask's vectors are. */
+struct rows {
+	const uint8_t *weight;
+	int32_t next; /* how far the next row of weights is */
+	uint64_t *word;
+	struct ewa_sum *sum;
+	__m512 across, dy; /* of each lane: what its column adds to z', and pixels down from the middle */
+	__mmask16 columns; /* of these those of the mask, or of its core */
+	int32_t n;         /* rows */
+};
+
+/* Masks whose pieces reach beyond the tile's columns are drawn pixel by pixel. */
+static inline int has_columns(const struct warp_target *t, int32_t begin, int32_t n)
+{
+	return begin >= 0 && begin + n <= t->x1 - t->x0;
 }
 
-/* What one->zx adds at each of these columns. */
-static inline __m512 across_of(const struct ewa_one *one)
+/* Begins with the pixels from column `begin` of the tile on, 8 or 16 a row; `reach` to each side of the middle count. */
+static inline __attribute__((always_inline)) void begin_rows(struct rows *rows, const struct warp_target *t,
+                                                             const struct ewa_one *one, const struct ewa_part *part,
+                                                             int32_t begin, int32_t reach, int per_row)
 {
 	const __m512i ordinals = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-	const __m512 dx = _mm512_cvtepi32_ps(_mm512_sub_epi32(ordinals, _mm512_set1_epi32(one->radius)));
+	const __m512i column = per_row == 8 ? _mm512_and_si512(ordinals, _mm512_set1_epi32(7)) : ordinals;
+	const int32_t first = begin - (one->x - t->x0), dy = part->y0 - one->y;
+	const __m512i dx = _mm512_add_epi32(column, _mm512_set1_epi32(first));
 
-	return _mm512_mul_ps(dx, _mm512_set1_ps(one->zx));
+	rows->weight = one->weight + (dy + one->radius) * one->next + (first + one->radius);
+	rows->next = one->next;
+	rows->word = t->word + (ptrdiff_t)(part->y0 - t->y0) * t->stride + begin;
+	rows->columns = _mm512_cmple_epi32_mask(_mm512_abs_epi32(dx), _mm512_set1_epi32(reach));
+	rows->across = _mm512_mul_ps(_mm512_cvtepi32_ps(dx), _mm512_set1_ps(one->zx));
+	rows->dy = _mm512_add_ps(_mm512_set1_ps((float)dy),
+	                         _mm512_cvtepi32_ps(_mm512_srli_epi32(ordinals, per_row == 8 ? 3 : 4)));
+	rows->n = part->y1 - part->y0;
 }
 
-static inline __m512 depths_of(const struct ewa_one *one, __m512 across, int32_t dy)
+/* The weights of a vector: of its row, or of its n rows of eight. */
+static inline __attribute__((always_inline)) __m128i weights_of(const struct rows *rows, int per_row, int n)
 {
-	const __m512 down = _mm512_set1_ps((float)dy * one->zy);
-	const __m512 z = _mm512_add_ps(_mm512_set1_ps(one->z), _mm512_add_ps(across, down));
+	if (per_row == 16)
+		return _mm_loadu_si128((const __m128i *)rows->weight);
+	const __m128i upper = _mm_loadl_epi64((const __m128i *)rows->weight);
+	return n == 1 ? upper : _mm_unpacklo_epi64(upper, _mm_loadl_epi64((const __m128i *)(rows->weight + rows->next)));
+}
+
+static inline __m512 depths_of(const struct ewa_one *one, const struct rows *rows)
+{
+	const __m512 down = _mm512_mul_ps(rows->dy, _mm512_set1_ps(one->zy));
+	const __m512 z = _mm512_add_ps(_mm512_set1_ps(one->z), _mm512_add_ps(rows->across, down));
 
 	return _mm512_max_ps(z, _mm512_set1_ps(one->least));
 }
 
-static inline void lower_eight(uint64_t *row, __mmask8 k, __m256 z, __m512i id)
+static inline void next_rows(struct rows *rows, const struct warp_target *t, int n)
 {
-	const __m512i word = _mm512_or_si512(_mm512_slli_epi64(_mm512_cvtepu32_epi64(_mm256_castps_si256(z)), 32), id);
+	rows->weight += n * rows->next;
+	rows->word += (ptrdiff_t)n * t->stride;
+	rows->dy = _mm512_add_ps(rows->dy, _mm512_set1_ps((float)n));
+}
 
-	_mm512_mask_storeu_epi64(row, k, _mm512_min_epu64(_mm512_maskz_loadu_epi64(k, row), word));
+static inline void lower_four(uint64_t *word, __mmask8 k, __m128 z, __m256i id)
+{
+	const __m256i there = _mm256_loadu_si256((const __m256i *)word);
+	const __m256i own = _mm256_or_si256(_mm256_slli_epi64(_mm256_cvtepu32_epi64(_mm_castps_si128(z)), 32), id);
+
+	_mm256_storeu_si256((__m256i *)word, _mm256_mask_min_epu64(there, k, there, own));
+}
+
+/* Lowers the words of a row. */
+static inline void lower_row(struct rows *rows, const struct warp_target *t, const struct ewa_one *one)
+{
+	const __m128i core = _mm_set1_epi8((char)one->core);
+	const __m256i id = _mm256_set1_epi64x(one->id);
+	const __m512 z = depths_of(one, rows);
+	__mmask16 k = _mm_mask_cmpge_epu8_mask(rows->columns, weights_of(rows, 16, 1), core);
+
+	k = _mm512_mask_cmp_ps_mask(k, z, _mm512_set1_ps(t->near_z), _CMP_GT_OQ);
+	lower_four(rows->word, (__mmask8)(k & 15), _mm512_castps512_ps128(z), id);
+	lower_four(rows->word + 4, (__mmask8)(k >> 4 & 15), _mm512_extractf32x4_ps(z, 1), id);
+	lower_four(rows->word + 8, (__mmask8)(k >> 8 & 15), _mm512_extractf32x4_ps(z, 2), id);
+	lower_four(rows->word + 12, (__mmask8)(k >> 12), _mm512_extractf32x4_ps(z, 3), id);
+	next_rows(rows, t, 1);
 }
 
 static inline void draw_words(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part)
 {
-	const __mmask16 columns = columns_of(one, part);
-	const __m128i core = _mm_set1_epi8((char)one->core);
-	const __m512 across = across_of(one), near_z = _mm512_set1_ps(t->near_z);
-	const __m512i id = _mm512_set1_epi64(one->id);
-	uint64_t *row = t->word + (ptrdiff_t)(part->y0 - t->y0) * t->stride + (one->x - one->radius - t->x0);
-	const uint8_t *weight = one->weight + (part->y0 - one->y + one->radius) * one->next;
+	const int32_t begin = (one->x - t->x0 - one->core_radius) & ~3;
+	struct rows rows;
 
-	for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, weight += one->next) {
-		const __m512 z = depths_of(one, across, y - one->y);
-		__mmask16 k = _mm_mask_cmpge_epu8_mask(columns, _mm_maskz_loadu_epi8(columns, weight), core);
-
-		k = _mm512_mask_cmp_ps_mask(k, z, near_z, _CMP_GT_OQ);
-		lower_eight(row, (__mmask8)k, _mm512_castps512_ps256(z), id);
-		if (k >> 8)
-			lower_eight(row + 8, (__mmask8)(k >> 8), _mm512_extractf32x8_ps(z, 1), id);
+	if (!has_columns(t, begin, 16)) {
+		ewa_draw_words(t, one, part);
+		return;
 	}
+	begin_rows(&rows, t, one, part, begin, one->core_radius, 16);
+	for (; rows.n > 0; rows.n--)
+		lower_row(&rows, t, one);
 }
 
-/* z' of the words of the pixels of k. */
-static inline __m512 words_of(const uint64_t *row, __mmask16 k)
+/* z' of a vector's words. */
+static inline __attribute__((always_inline)) __m512 words_of(const struct rows *rows, const struct warp_target *t,
+                                                             int per_row, int n)
 {
 	const __m512i upper = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-	const __m512i low = _mm512_maskz_loadu_epi64((__mmask8)k, row);
-	const __m512i high = _mm512_maskz_loadu_epi64((__mmask8)(k >> 8), row + 8);
+	const uint64_t *next = per_row == 16 ? rows->word + 8 : rows->word + t->stride;
+	const __m512i low = _mm512_maskz_loadu_epi64((__mmask8)rows->columns, rows->word);
+	const __m512i high = n == 1 && per_row == 8 ? low : _mm512_maskz_loadu_epi64((__mmask8)(rows->columns >> 8), next);
 
 	return _mm512_castsi512_ps(_mm512_permutex2var_epi32(low, upper, high));
 }
 
-/* Adds a splat to two pixels, or to those of them whose bits are set. */
-static inline void add_pair(uint32_t *to, uint32_t bits, __m512i own, __m512i weights)
+/* Adds a splat to two pixels, of the weights of the lanes from `first` on. Products are of 16 bits: 255 by 511 or
+ * EWA_COLOR_ONE. */
+static inline void add_pair(struct ewa_sum *to, __m512i own, __m512i weights, int first)
 {
-	static const __mmask16 lanes[4] = { 0, 0xff, 0xff00, 0xffff };
-	const __mmask16 some = lanes[bits & 3];
+	const __m512i pair = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1);
+	const __m512i both = _mm512_permutexvar_epi32(_mm512_add_epi32(pair, _mm512_set1_epi32(first)), weights);
 
-	_mm512_mask_storeu_epi32(to, some,
-	                         _mm512_add_epi32(_mm512_maskz_loadu_epi32(some, to), _mm512_mullo_epi32(own, weights)));
+	_mm512_storeu_si512(to, _mm512_add_epi32(_mm512_loadu_si512(to), _mm512_madd_epi16(own, both)));
+}
+
+/* Adds a splat to the pixels of a vector of n rows of so many pairs. */
+static inline __attribute__((always_inline)) void add_rows(struct rows *rows, const struct warp_target *t,
+                                                           const struct ewa_one *one, __m512 behind, __m512i own,
+                                                           int n_pairs, int n)
+{
+	const int per_row = n_pairs > 4 ? 16 : 8;
+	const __m512 z = _mm512_sub_ps(depths_of(one, rows), behind);
+	const __mmask16 k = _mm512_mask_cmp_ps_mask(rows->columns, z, words_of(rows, t, per_row, n), _CMP_LE_OQ);
+	const __m512i weights = _mm512_maskz_cvtepu8_epi32(k, weights_of(rows, per_row, n));
+
+	for (int row = 0; k && row < n; row++)
+		for (int p = 0; p < n_pairs; p++)
+			add_pair(rows->sum + (size_t)row * t->sum_stride + 2 * p, own, weights, 8 * row + 2 * p);
+	rows->sum += (size_t)n * t->sum_stride;
+	next_rows(rows, t, n);
+}
+
+static inline __attribute__((always_inline)) void add_mask(const struct warp_target *t, const struct ewa_one *one,
+                                                           const struct ewa_part *part, float same,
+                                                           const uint32_t value[EWA_LANES], int radius)
+{
+	const int n_pairs = radius + 1, per_row = n_pairs > 4 ? 16 : 8, step = 16 / per_row;
+	const int32_t begin = (one->x - t->x0 - radius) & ~1;
+	const __m512i own = _mm512_broadcast_i64x4(_mm256_loadu_si256((const __m256i *)value));
+	const __m512 behind = _mm512_set1_ps(same);
+	struct rows rows;
+
+	if (!has_columns(t, begin, 2 * n_pairs)) {
+		ewa_draw_sums(t, one, part, same, value);
+		return;
+	}
+	begin_rows(&rows, t, one, part, begin, radius, per_row);
+	rows.sum = t->sum + (ptrdiff_t)(part->y0 - t->y0) * t->sum_stride + begin;
+	for (; rows.n >= step; rows.n -= step)
+		add_rows(&rows, t, one, behind, own, n_pairs, step);
+	if (rows.n > 0)
+		add_rows(&rows, t, one, behind, own, n_pairs, 1);
 }
 
 static inline void draw_sums(const struct warp_target *t, const struct ewa_one *one, const struct ewa_part *part,
                              float same, const uint32_t value[EWA_LANES])
 {
-	const __mmask16 columns = columns_of(one, part);
-	const __m512 across = across_of(one), behind = _mm512_set1_ps(same);
-	const __m512i own = _mm512_broadcast_i64x4(_mm256_loadu_si256((const __m256i *)value)), two = _mm512_set1_epi32(2);
-	const __m512i first = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1);
-	const ptrdiff_t left = one->x - one->radius - t->x0;
-	const uint64_t *row = t->word + (ptrdiff_t)(part->y0 - t->y0) * t->stride + left;
-	struct ewa_sum *sum = t->sum + (ptrdiff_t)(part->y0 - t->y0) * t->sum_stride + left;
-	const uint8_t *weight = one->weight + (part->y0 - one->y + one->radius) * one->next;
-	const int is_narrow = one->radius == 1;
-
-	for (int32_t y = part->y0; y < part->y1; y++, row += t->stride, sum += t->sum_stride, weight += one->next) {
-		const __m128i bytes = _mm_maskz_loadu_epi8(columns, weight);
-		const __m512i weights = _mm512_cvtepu8_epi32(bytes);
-		__mmask16 k = _mm_test_epi8_mask(bytes, bytes);
-		__m512i pair = first;
-		uint32_t *to = sum->lane;
-
-		k = _mm512_mask_cmp_ps_mask(k, _mm512_sub_ps(depths_of(one, across, y - one->y), behind), words_of(row, k),
-		                            _CMP_LE_OQ);
-		if (is_narrow) { /* three pixels: a branch on each row's would cost more */
-			add_pair(to, k, own, _mm512_permutexvar_epi32(first, weights));
-			add_pair(to + 2 * EWA_LANES, k >> 2, own, _mm512_permutexvar_epi32(_mm512_add_epi32(first, two), weights));
-			continue;
-		}
-		for (uint32_t rest = k; rest; rest >>= 2, pair = _mm512_add_epi32(pair, two), to += 2 * EWA_LANES)
-			add_pair(to, rest, own, _mm512_permutexvar_epi32(pair, weights));
+	switch (one->radius) { /* each with loops of a constant length */
+	case 1: add_mask(t, one, part, same, value, 1); break;
+	case 2: add_mask(t, one, part, same, value, 2); break;
+	case 3: add_mask(t, one, part, same, value, 3); break;
+	case 4: add_mask(t, one, part, same, value, 4); break;
+	case 6: add_mask(t, one, part, same, value, 6); break;
+	case 7: add_mask(t, one, part, same, value, 7); break;
+	default: ewa_draw_sums(t, one, part, same, value);
 	}
 }
 
-static inline void list_masks(struct ewa_sorted *sorted, const struct ewa_leaves *l, uint32_t i, __m512i number)
-{
-	const __m512i has_mask = _mm512_loadu_si512(l->has_mask + i);
-	const __mmask16 k = _mm512_test_epi32_mask(has_mask, has_mask);
+/* ---- batches ---- */
 
+static inline void list_masks(struct ewa_sorted *sorted, __mmask16 k, __m512i number)
+{
 	_mm512_storeu_si512(sorted->mask + sorted->n_masks, _mm512_maskz_compress_epi32(k, number));
 	sorted->n_masks += (uint32_t)__builtin_popcount(k);
+}
+
+/* The lanes that have a bit. */
+static inline __mmask16 load_mask(const int32_t *lanes, int bit)
+{
+	return _mm512_test_epi32_mask(_mm512_loadu_si512(lanes), _mm512_set1_epi32(bit));
+}
+
+/* Lists the words of the pixels of k, lowering those before them where there is no room. */
+static inline void push_words(struct words *words, const struct warp_target *t, __mmask16 k, __m512i pixel, __m512i id,
+                              __m512 z)
+{
+	const struct warped ones = { pixel, id, _mm512_castps_si512(z), _mm512_setzero_si512() };
+
+	if (words->n > LIST - 16)
+		lower_words(t->word, words);
+	k = _mm512_mask_cmp_ps_mask(k, z, _mm512_set1_ps(t->near_z), _CMP_GT_OQ);
+	words->n = list_words(words, words->n, NULL, 1, k, ones);
+}
+
+/* Lists the words of narrow cores of 16 leaves, from leaf i on: a pixel after the other, of all that have it. */
+static inline void list_cores(struct words *words, const struct warp_target *t, const struct ewa_leaves *l, uint32_t i,
+                              __m512i cores)
+{
+	const __m512i left = _mm512_sub_epi32(_mm512_loadu_si512(l->x + i), _mm512_set1_epi32(t->x0));
+	const __m512i top = _mm512_sub_epi32(_mm512_loadu_si512(l->y + i), _mm512_set1_epi32(t->y0));
+	const __m512i width = _mm512_set1_epi32(t->x1 - t->x0), height = _mm512_set1_epi32(t->y1 - t->y0);
+	const __mmask16 is_flipped = load_mask(l->is_flipped + i, 1);
+	const __m512i zero = _mm512_setzero_si512(), id = _mm512_loadu_si512(l->id + i);
+	const __m512 middle = _mm512_loadu_ps(l->z + i), least = _mm512_loadu_ps(l->least + i);
+	const __m512 zx = _mm512_loadu_ps(l->zx + i), zy = _mm512_loadu_ps(l->zy + i);
+
+	for (uint32_t any = (uint32_t)_mm512_reduce_or_epi32(cores); any; any &= any - 1) {
+		const uint32_t bit = (uint32_t)__builtin_ctz(any);
+		const __m512i dx = _mm512_set1_epi32((int32_t)(bit % EWA_CORE_SIDE) - EWA_CORE_RADIUS);
+		const __m512i down = _mm512_set1_epi32((int32_t)(bit / EWA_CORE_SIDE) - EWA_CORE_RADIUS);
+		const __m512i dy = _mm512_mask_sub_epi32(down, is_flipped, zero, down);
+		const __m512i x = _mm512_add_epi32(left, dx), y = _mm512_add_epi32(top, dy);
+		const __m512 across = _mm512_mul_ps(_mm512_cvtepi32_ps(dx), zx);
+		const __m512 slope = _mm512_add_ps(across, _mm512_mul_ps(_mm512_cvtepi32_ps(dy), zy));
+		const __m512 z = _mm512_max_ps(_mm512_add_ps(middle, slope), least);
+		__mmask16 k = _mm512_test_epi32_mask(cores, _mm512_set1_epi32(1 << bit));
+
+		k = _mm512_mask_cmplt_epu32_mask(_mm512_mask_cmplt_epu32_mask(k, x, width), y, height);
+		push_words(words, t, k, _mm512_add_epi32(_mm512_mullo_epi32(y, _mm512_set1_epi32((int)t->stride)), x), id, z);
+	}
 }
 
 static inline uint32_t sort_words(struct words *words, struct ewa_sorted *sorted, const struct ewa_leaves *l,
                                   const struct warp_target *t)
 {
-	const __m512i none = _mm512_set1_epi32(-1);
-	const __m512 near_z = _mm512_set1_ps(t->near_z);
+	const __m512i none = _mm512_set1_epi32(-1), per_size = _mm512_set1_epi32(EWA_SHAPES * EWA_SECTORS);
 	__m512i number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 	uint32_t n_inside = 0;
 
 	sorted->n_masks = 0;
 	for (uint32_t i = 0; i < l->n; i += 16, number = _mm512_add_epi32(number, _mm512_set1_epi32(16))) {
-		const __m512i pixel = _mm512_loadu_si512(l->pixel + i);
-		const __m512 z = _mm512_loadu_ps(l->pixel_z + i);
-		const __mmask16 is_one = _mm512_cmpneq_epi32_mask(pixel, none);
-		const struct warped ones = { pixel, _mm512_loadu_si512(l->id + i), _mm512_castps_si512(z),
-			                         _mm512_setzero_si512() };
+		const __m512i pixel = _mm512_loadu_si512(l->pixel + i), size = _mm512_loadu_si512(l->size + i);
+		const __mmask16 is_one = _mm512_cmpneq_epi32_mask(pixel, none), has_mask = load_mask(l->has_mask + i, 1);
+		const __mmask16 is_narrow = _mm512_mask_cmple_epi32_mask(has_mask, size, _mm512_set1_epi32(EWA_NARROW));
 
-		n_inside += (uint32_t)__builtin_popcount(is_one);
-		words->n =
-			list_words(words, words->n, NULL, 1, _mm512_mask_cmp_ps_mask(is_one, z, near_z, _CMP_GT_OQ), ones);
-		list_masks(sorted, l, i, number);
+		n_inside += (uint32_t)__builtin_popcount(is_one | load_mask(l->has_mask + i, 2));
+		push_words(words, t, is_one, pixel, _mm512_loadu_si512(l->id + i), _mm512_loadu_ps(l->pixel_z + i));
+		if (is_narrow) {
+			const __m512i mask = _mm512_add_epi32(_mm512_mullo_epi32(size, per_size), _mm512_loadu_si512(l->mask + i));
+
+			list_cores(words, t, l, i,
+			           _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), is_narrow, mask, ewa_core_bits, 4));
+		}
+		list_masks(sorted, has_mask & (__mmask16)~is_narrow, number);
 	}
 	return n_inside;
 }
@@ -203,12 +325,34 @@ static inline void sort_sums(struct ewa_sorted *sorted, const struct ewa_leaves 
 		_mm512_storeu_si512(sorted->weight + n, _mm512_maskz_compress_epi32(k, _mm512_and_si512(weight, byte)));
 		_mm512_storeu_si512(sorted->one + n, _mm512_maskz_compress_epi32(k, number));
 		n += (uint32_t)__builtin_popcount(k);
-		list_masks(sorted, l, i, number);
+		list_masks(sorted, load_mask(l->has_mask + i, 1), number);
 	}
 	sorted->n_ones = n;
 }
 
-static const struct ewa_parts parts = { list_leaves, sort_words, sort_sums, draw_words, draw_sums };
+/* The weights and normals of four leaves are a transposed 4x4. */
+static inline void put_normals(struct ewa_leaves *l)
+{
+	const __m512i weight = _mm512_set1_epi32(1);
+
+	for (uint32_t i = 0; i < l->n; i += 16) {
+		const __m512i x = _mm512_loadu_si512(l->turned[0] + i), y = _mm512_loadu_si512(l->turned[1] + i);
+		const __m512i z = _mm512_loadu_si512(l->turned[2] + i);
+		const __m512i low[2] = { _mm512_unpacklo_epi32(weight, x), _mm512_unpacklo_epi32(y, z) };
+		const __m512i high[2] = { _mm512_unpackhi_epi32(weight, x), _mm512_unpackhi_epi32(y, z) };
+		const __m512i fourth[4] = { _mm512_unpacklo_epi64(low[0], low[1]), _mm512_unpackhi_epi64(low[0], low[1]),
+			                        _mm512_unpacklo_epi64(high[0], high[1]), _mm512_unpackhi_epi64(high[0], high[1]) };
+
+		for (uint32_t k = 0; k < 4; k++) {
+			_mm_store_si128((__m128i *)l->value[i + k], _mm512_castsi512_si128(fourth[k]));
+			_mm_store_si128((__m128i *)l->value[i + 4 + k], _mm512_extracti32x4_epi32(fourth[k], 1));
+			_mm_store_si128((__m128i *)l->value[i + 8 + k], _mm512_extracti32x4_epi32(fourth[k], 2));
+			_mm_store_si128((__m128i *)l->value[i + 12 + k], _mm512_extracti32x4_epi32(fourth[k], 3));
+		}
+	}
+}
+
+static const struct ewa_parts parts = { list_leaves, sort_words, sort_sums, put_normals, draw_words, draw_sums };
 
 uint64_t ewa_words_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {

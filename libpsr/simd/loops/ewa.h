@@ -196,7 +196,8 @@ struct ewa_sorted {
 	uint32_t mask[EWA_ROOM], sum[EWA_ROOM], weight[EWA_ROOM], one[EWA_ROOM];
 };
 
-/* Sorts a batch: lists the words of leaves of a single pixel, and returns how many are in the tile; there is room. */
+/* Sorts a batch: lists the words of leaves of a single pixel, or of more as it can, the other ones as masks, and
+ * returns how many have their middle in the tile. There is room for a word of each leaf. */
 typedef uint32_t ewa_sort_words_fn(struct words *words, struct ewa_sorted *sorted, const struct ewa_leaves *l,
                                    const struct warp_target *t);
 /* Sorts a batch for sums. */
@@ -212,10 +213,10 @@ static inline uint32_t ewa_sort_words(struct words *words, struct ewa_sorted *so
 
 		words->word[n_words] = (uint64_t)psr_bits_from_float(l->pixel_z[i]) << 32 | l->id[i];
 		words->at[n_words] = l->pixel[i];
-		n_inside += is_one;
+		n_inside += is_one | (uint32_t)l->has_mask[i] >> 1;
 		n_words += is_one & (l->pixel_z[i] > t->near_z);
 		sorted->mask[n_masks] = i;
-		n_masks += (uint32_t)l->has_mask[i];
+		n_masks += (uint32_t)l->has_mask[i] & 1;
 	}
 	words->n = n_words;
 	sorted->n_masks = n_masks;
@@ -235,7 +236,7 @@ static inline void ewa_sort_sums(struct ewa_sorted *sorted, const struct ewa_lea
 		sorted->one[n_ones] = i;
 		n_ones += is_one & (l->pixel_z[i] - l->same[i] <= own);
 		sorted->mask[n_masks] = i;
-		n_masks += (uint32_t)l->has_mask[i];
+		n_masks += (uint32_t)l->has_mask[i] & 1;
 	}
 	sorted->n_ones = n_ones;
 	sorted->n_masks = n_masks;
@@ -245,6 +246,7 @@ struct ewa_parts {
 	ewa_list_fn *list;
 	ewa_sort_words_fn *sort_words;
 	ewa_sort_sums_fn *sort_sums;
+	ewa_put_normals_fn *put_normals;
 	ewa_draw_words_fn *draw_words;
 	ewa_draw_sums_fn *draw_sums;
 };
@@ -277,7 +279,7 @@ static inline __attribute__((always_inline)) int ewa_fill(struct ewa_leaves *l, 
 		l->in = in;
 		list(l, t, &r->entry[e], cube);
 		if (with_looks)
-			ewa_read_colors(l, cube, n);
+			ewa_put_colors(l, cube, n);
 	}
 	return l->n > 0;
 }
@@ -302,7 +304,6 @@ static inline __attribute__((always_inline)) uint64_t ewa_words_by(struct ewa_pa
 		for (uint32_t k = 0; k < sorted.n_masks; k++) {
 			const uint32_t i = sorted.mask[k];
 
-			n_inside += (uint64_t)((l.x[i] >= t->x0) & (l.x[i] < t->x1) & (l.y[i] >= t->y0) & (l.y[i] < t->y1));
 			if (l.size[i] == EWA_SIZES) {
 				ewa_draw_wide(t, &l, i, 0, NULL);
 				continue;
@@ -351,7 +352,8 @@ static inline __attribute__((always_inline)) uint64_t ewa_sums_by(struct ewa_par
 
 	while (ewa_fill(&l, &reader, parts.list, 1)) {
 		ewa_place(&l, t);
-		ewa_look(&l);
+		ewa_turn(&l);
+		parts.put_normals(&l);
 		parts.sort_sums(&sorted, &l, t);
 		ewa_add_ones(t, &sorted, &l);
 		n_given += l.n;

@@ -37,13 +37,12 @@ struct ewa_leaves {
 	int32_t size[EWA_ROOM];
 	int32_t mask[EWA_ROOM]; /* shape and sector: of the masks of its size */
 	int32_t is_flipped[EWA_ROOM]; /* the mask, up and down */
-	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile, and its z'; 1 of others
-	 * that may be drawn. */
+	/* Of those of size 0: the pixel, counted as words are, or UINT32_MAX outside of the tile, and its z'; of others
+	 * that may be drawn 1, or with their middle in the tile 3. */
 	uint32_t pixel[EWA_ROOM];
 	float pixel_z[EWA_ROOM];
 	int32_t has_mask[EWA_ROOM];
 	int32_t turned[3][EWA_ROOM]; /* normals in camera space */
-	int is_gray;
 	_Alignas(64) uint32_t value[EWA_ROOM][EWA_LANES]; /* as of ewa_sum, of weight 1 */
 };
 
@@ -240,12 +239,12 @@ static inline void ewa_find_pixels(struct ewa_leaves *l, const struct warp_targe
 
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t x = (uint32_t)(l->x[i] - x0), y = (uint32_t)(l->y[i] - y0);
-		const int is_drawn = l->is_left[i] & (l->size[i] == 0) & (x < w) & (y < h);
+		const int is_inside = (x < w) & (y < h), is_drawn = l->is_left[i] & (l->size[i] == 0) & is_inside;
 		const float z = psr_choose(l->z[i] > l->least[i], l->z[i], l->least[i]);
 
 		l->pixel[i] = (y * stride + x) | (0u - (uint32_t)!is_drawn);
 		l->pixel_z[i] = z;
-		l->has_mask[i] = l->is_left[i] & (l->size[i] > 0);
+		l->has_mask[i] = -(l->is_left[i] & (l->size[i] > 0)) & (1 + 2 * is_inside);
 	}
 }
 
@@ -270,22 +269,25 @@ static inline int32_t ewa_round(float x)
 	return psr_floor_int(x + 0.5f);
 }
 
-/* Reads the colours of the n leaves that a cube has added to the batch, if it has any. */
-static inline void ewa_read_colors(struct ewa_leaves *l, const struct warp_cube *cube, uint32_t n)
+/* Puts the colours of the n leaves that a cube has added to the batch into their values, which end with them. */
+static inline void ewa_put_colors(struct ewa_leaves *l, const struct warp_cube *cube, uint32_t n)
 {
-	l->is_gray = cube->color == NULL;
-	for (uint32_t i = l->n - n, j = 0; !l->is_gray && i < l->n; i++, j++)
-		for (int k = 0; k < 3; k++)
-			l->value[i][EWA_COLOR + k] =
-				(uint32_t)(int32_t)(psr_srgb_to_linear[cube->color[j][k]] * EWA_COLOR_ONE + 0.5f);
+	const uint32_t gray = (uint32_t)(int32_t)(psr_srgb_to_linear[CUBES_GRAY & 0xff] * EWA_COLOR_ONE + 0.5f);
+	const uint32_t plain[EWA_LANES - EWA_COLOR] = { gray, gray, gray, 0 };
+	uint32_t (*value)[EWA_LANES] = l->value + (l->n - n);
+
+	for (uint32_t i = 0; i < n; i++) {
+		memcpy(value[i] + EWA_COLOR, plain, sizeof plain);
+		for (int k = 0; cube->color != NULL && k < 3; k++)
+			value[i][EWA_COLOR + k] =
+				(uint32_t)(int32_t)(psr_srgb_to_linear[cube->color[i][k]] * EWA_COLOR_ONE + 0.5f);
+	}
 }
 
-/* Finds all values but colours: normals in camera space, and of those without colours gray. */
-static inline void ewa_look(struct ewa_leaves *l)
+/* Finds normals in camera space. */
+static inline void ewa_turn(struct ewa_leaves *l)
 {
 	const uint32_t n = ewa_lanes(l);
-	const uint32_t gray = (uint32_t)(int32_t)(psr_srgb_to_linear[CUBES_GRAY & 0xff] * EWA_COLOR_ONE + 0.5f);
-	const uint32_t plain[EWA_LANES] = { [EWA_WEIGHT] = 1, [EWA_COLOR] = gray, gray, gray };
 	float turn[3][3];
 
 	memcpy(turn, l->in->turn, sizeof turn);
@@ -296,13 +298,17 @@ static inline void ewa_look(struct ewa_leaves *l)
 		for (int k = 0; k < 3; k++)
 			l->turned[k][i] = ewa_round(ewa_dot(turn[k], nx, ny, nz));
 	}
+}
+
+/* Puts a weight of 1 and normals into the values of a batch, which begin with them. */
+typedef void ewa_put_normals_fn(struct ewa_leaves *l);
+
+static inline void ewa_put_normals(struct ewa_leaves *l)
+{
 	for (uint32_t i = 0; i < l->n; i++) {
-		if (l->is_gray)
-			memcpy(l->value[i], plain, sizeof plain);
 		l->value[i][EWA_WEIGHT] = 1;
 		for (int k = 0; k < 3; k++)
 			l->value[i][EWA_NORMAL + k] = (uint32_t)l->turned[k][i];
-		l->value[i][EWA_LANES - 1] = 0;
 	}
 }
 

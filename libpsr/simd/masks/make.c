@@ -87,7 +87,7 @@ static void make_bell(struct bell *g, uint32_t shape, double edge)
 }
 
 /* Writes a mask, and returns the least weight of its core. */
-static unsigned write_mask(const struct ewa_size *size, uint32_t shape, uint32_t sector)
+static unsigned write_mask(uint8_t weight[], const struct ewa_size *size, uint32_t shape, uint32_t sector)
 {
 	const int radius = (int)size->radius;
 	const double right = sector & 1 ? 0.25 : -0.25, down = sector & 2 ? 0.25 : -0.25;
@@ -97,10 +97,11 @@ static unsigned write_mask(const struct ewa_size *size, uint32_t shape, uint32_t
 	make_bell(&g, shape, (double)size->edge);
 	for (int y = -radius; y <= radius; y++) {
 		putchar('\n');
-		for (int x = -radius; x <= radius; x++) {
+		for (int x = -radius; x <= radius; x++, weight++) {
 			const double mean = mean_in_pixel(&g, x - right, y - down);
 
-			printf("%d,", (int)(255 * mean + 0.5));
+			*weight = (uint8_t)(255 * mean + 0.5);
+			printf("%d,", *weight);
 			most = mean > most ? mean : most;
 		}
 	}
@@ -108,20 +109,43 @@ static unsigned write_mask(const struct ewa_size *size, uint32_t shape, uint32_t
 	return core > 1 ? (unsigned)core : 1;
 }
 
+/* The pixels of a core, as bits. */
+static uint32_t core_bits(const uint8_t weight[], const struct ewa_size *size, unsigned least)
+{
+	const int radius = (int)size->radius, reach = (int)size->core_radius, side = EWA_SIDE(radius);
+	uint32_t bits = 0;
+
+	for (int y = -reach; y <= reach; y++)
+		for (int x = -reach; x <= reach; x++)
+			bits |= (uint32_t)(weight[(y + radius) * side + x + radius] >= least)
+			        << (EWA_CORE_SIDE * (y + EWA_CORE_RADIUS) + x + EWA_CORE_RADIUS);
+	return bits;
+}
+
+static void write_numbers(const char *name, const uint32_t number[], uint32_t n)
+{
+	printf("\n};\nconst %s = {", name);
+	for (uint32_t i = 0; i < n; i++)
+		printf("%s%lu,", i % 32 == 0 ? "\n" : "", (unsigned long)number[i]);
+}
+
 int main(void)
 {
-	static unsigned core[EWA_MASKS];
-	uint32_t first = 0;
+	static uint8_t weight[EWA_SIDE(EWA_MOST_RADIUS) * EWA_SIDE(EWA_MOST_RADIUS)];
+	static uint32_t core[EWA_MASKS], bits[EWA_NARROW_MASKS];
+	uint32_t first = 0, i = 0;
 
 	printf("#include \"libpsr/simd/ewa_masks.h\"\nconst uint8_t ewa_weight[EWA_BYTES + EWA_BEYOND] = {");
 	for (uint32_t k = 0; k < EWA_SIZES; k++)
-		for (uint32_t i = 0; i < EWA_SHAPES * EWA_SECTORS; i++)
-			core[k * EWA_SHAPES * EWA_SECTORS + i] = write_mask(&sizes[k], i / EWA_SECTORS, i % EWA_SECTORS);
-	printf("\n};\nconst uint8_t ewa_core[EWA_MASKS] = {");
-	for (uint32_t i = 0; i < EWA_MASKS; i++)
-		printf("%s%u,", i % 32 == 0 ? "\n" : "", core[i]);
+		for (uint32_t m = 0; m < EWA_SHAPES * EWA_SECTORS; m++, i++) {
+			core[i] = write_mask(weight, &sizes[k], m / EWA_SECTORS, m % EWA_SECTORS);
+			if (i < EWA_NARROW_MASKS)
+				bits[i] = core_bits(weight, &sizes[k], core[i]);
+		}
+	write_numbers("uint8_t ewa_core[EWA_MASKS]", core, EWA_MASKS);
+	write_numbers("uint32_t ewa_core_bits[EWA_NARROW_MASKS]", bits, EWA_NARROW_MASKS);
 	printf("\n};\nconst uint8_t ewa_bell[EWA_BELL] = {");
-	for (uint32_t i = 0; i < EWA_BELL; i++)
+	for (i = 0; i < EWA_BELL; i++)
 		printf("%s%d,", i % 32 == 0 ? "\n" : "", (int)(255 * falling_exp((i + 0.5) / (2 * EWA_STEPS)) + 0.5));
 	printf("\n};\nconst struct ewa_size ewa_size[EWA_SIZES] = {\n");
 	for (uint32_t k = 0; k < EWA_SIZES; k++) {

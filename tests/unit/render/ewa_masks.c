@@ -117,6 +117,29 @@ static void the_core_radius_is_the_least_that_holds_all_cores(void **state)
 	}
 }
 
+/* Narrow cores are told as bits, too. */
+static void bits_of_narrow_cores_are_their_pixels(void **state)
+{
+	(void)state;
+	for (uint32_t k = 0; k <= EWA_NARROW; k++)
+		for (uint32_t i = 0; i < EWA_SHAPES * EWA_SECTORS; i++) {
+			const int radius = (int)ewa_size[k].radius, side = EWA_SIDE(radius);
+			const uint8_t *weight = ewa_weight + ewa_size[k].first + i * (uint32_t)(side * side);
+			const uint32_t number = ewa_number(k, 0, 0) + i;
+			uint32_t bits = 0;
+
+			for (int n = 0; n < side * side; n++)
+				if (weight[n] >= ewa_core[number]) {
+					const int x = n % side - radius + EWA_CORE_RADIUS, y = n / side - radius + EWA_CORE_RADIUS;
+
+					assert_in_range(x, 0, EWA_CORE_SIDE - 1);
+					assert_in_range(y, 0, EWA_CORE_SIDE - 1);
+					bits |= 1u << (EWA_CORE_SIDE * y + x);
+				}
+			assert_int_equal(ewa_core_bits[number], bits);
+		}
+}
+
 static void sizes_fill_the_table(void **state)
 {
 	uint32_t first = 0;
@@ -159,6 +182,7 @@ int main(void)
 		cmocka_unit_test(the_bell_is_the_exponential),
 		cmocka_unit_test(each_mask_has_a_core_around_its_middle),
 		cmocka_unit_test(the_core_radius_is_the_least_that_holds_all_cores),
+		cmocka_unit_test(bits_of_narrow_cores_are_their_pixels),
 		cmocka_unit_test(sizes_fill_the_table),
 		cmocka_unit_test(shapes_are_64_tilts_of_an_octant),
 	};
