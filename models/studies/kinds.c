@@ -121,11 +121,11 @@ const struct study_kind study_tables[] = {
 	{ "octree", "[B] table 1", "octrees, beside blocks of the same models", table_octree, "teapot,kittyhawk,pinetree",
 	  NOTE_OCTREE, NULL },
 	{ "octree-points", "[B] table 1", "points and splats a second, 512x512", table_octree_points, "teapot,kittyhawk,pinetree",
-	  "M pts: leaves of the tree. whole: these times frames a second, where the whole tree is drawn, as [B] tells it.\n"
-	  "drawn: millions of points that a frame at the levels it needs leaves after culling; warped: those of them that are\n"
-	  "placed in the picture and do not face away, and how much of the tree they are. frames: warped points times frames a\n"
-	  "second; Mpt/s: warped points by the time of culling and warp alone, splats likewise, each beside what is asked.\n"
-	  "[B], 2002: whole is 7 to 15 M points a second, and 1.6 to 5.3 M splats.", NULL },
+	  "M pts: leaves of the tree. whole: these times frames a second, where the whole tree is drawn, as [B] tells it;\n"
+	  "splats likewise, each beside what is asked ([B], 2002: 7 to 15 M points, 1.6 to 5.3 M splats). drawn: millions of\n"
+	  "points that a frame at the levels it needs leaves after culling; warped: those of them that are placed in the\n"
+	  "picture and do not face away, and how much of the tree they are. frames: warped points times frames a second;\n"
+	  "Mpt/s: warped points by the time of culling and warp alone, Mspl/s splats likewise.", NULL },
 	{ "octree-prefixes", "[B] figure 13", "parts of packed octrees of 11 levels", table_octree_prefixes, "teapot,kittyhawk",
 	  "MB: of the file, that have come; levels, M pts: of the model that they are; below: decibels that it lacks of the\n"
 	  "whole; wrong: holes and leaks, of a million pixels inside.", PLOT_PREFIXES },

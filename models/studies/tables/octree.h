@@ -24,7 +24,7 @@ struct octree_drawn {
 	double inside_db;      /* of octree_score() */
 };
 
-#define OCTREE_MOST_WAYS 3
+#define OCTREE_MOST_WAYS 4
 
 /* A way to show a model. */
 struct octree_way {

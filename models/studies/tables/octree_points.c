@@ -1,5 +1,5 @@
-/* Points and splats a second, told in both ways: those that are placed in the picture, and as table 1 of [B] has them, of
- * the whole tree, which is drawn down to its leaves for that. */
+/* Points and splats a second, told in both ways: as table 1 of [B] has them, of the whole tree, which is drawn down to its
+ * leaves for that, and beside what is asked; and those that are placed in the picture. */
 #include "octree.h"
 
 #define FIRST_LEVEL 9
@@ -10,40 +10,43 @@
 #define OF_SCANS 230
 #define OF_SPLATS 30
 
-enum { POINTS, WHOLE, DRAWN, WARPED, SHARE, OF_FRAMES, RATE, ASKED, SPLATS, ASKED_SPLATS, N_COLUMNS };
+enum { POINTS, WHOLE, ASKED, WHOLE_SPLATS, ASKED_SPLATS, DRAWN, WARPED, SHARE, OF_FRAMES, RATE, SPLATS, N_COLUMNS };
 
 static const struct study_column columns[N_COLUMNS] = {
 	[POINTS] = { "M pts", "million_points", 2 },
 	[WHOLE] = { "whole", "million_points_of_the_tree_per_second", 0 },
+	[ASKED] = { "asked", "million_points_of_the_tree_asked_per_second", 0 },
+	[WHOLE_SPLATS] = { "splats", "million_splats_of_the_tree_per_second", 0 },
+	[ASKED_SPLATS] = { "asked", "million_splats_of_the_tree_asked_per_second", 0 },
 	[DRAWN] = { "drawn", "million_points_drawn", 3 },
 	[WARPED] = { "warped", "million_points_warped", 3 },
 	[SHARE] = { "%", "percent_warped", 1 },
 	[OF_FRAMES] = { "frames", "million_points_warped_per_second_of_frames", 0 },
 	[RATE] = { "Mpt/s", "million_points_warped_per_second", 0 },
-	[ASKED] = { "asked", "million_points_asked_per_second", 0 },
-	[SPLATS] = { "splats", "million_splats_warped_per_second", 0 },
-	[ASKED_SPLATS] = { "asked", "million_splats_asked_per_second", 0 },
+	[SPLATS] = { "Mspl/s", "million_splats_warped_per_second", 0 },
 };
 
 static int put_rates(struct study *study, int row, const struct study_model *of, const struct psr_model *model,
                      double n_points)
 {
 	const struct octree_way way[] = { { .model = model }, { .model = model, .with_splats = 1 },
-		                              { .model = model, .is_whole = 1 } };
-	struct octree_rate rate[3];
-	const int rc = octree_rates(rate, study, of, way, 3);
-	const struct octree_rate *points = &rate[0], *splats = &rate[1], *whole = &rate[2];
+		                              { .model = model, .is_whole = 1 },
+		                              { .model = model, .with_splats = 1, .is_whole = 1 } };
+	struct octree_rate rate[4];
+	const int rc = octree_rates(rate, study, of, way, 4);
+	const struct octree_rate *points = &rate[0], *splats = &rate[1], *whole = &rate[2], *whole_splats = &rate[3];
 	const double value[N_COLUMNS] = {
 		[POINTS] = n_points * 1e-6,
 		[WHOLE] = OCTREE_VIEWS * n_points / whole->seconds * 1e-6,
+		[ASKED] = of->is_scanned ? OF_SCANS : OF_SURFACES,
+		[WHOLE_SPLATS] = OCTREE_VIEWS * n_points / whole_splats->seconds * 1e-6,
+		[ASKED_SPLATS] = OF_SPLATS,
 		[DRAWN] = points->drawn / OCTREE_VIEWS * 1e-6,
 		[WARPED] = points->warped / OCTREE_VIEWS * 1e-6,
 		[SHARE] = 100 * points->warped / OCTREE_VIEWS / n_points,
 		[OF_FRAMES] = points->warped / points->seconds * 1e-6,
 		[RATE] = points->warped / points->warp_seconds * 1e-6,
-		[ASKED] = of->is_scanned ? OF_SCANS : OF_SURFACES,
 		[SPLATS] = splats->warped / splats->warp_seconds * 1e-6,
-		[ASKED_SPLATS] = OF_SPLATS,
 	};
 
 	for (int c = 0; rc == PSR_OK && c < N_COLUMNS; c++)
