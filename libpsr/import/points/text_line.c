@@ -66,6 +66,31 @@ static void show(char out[SHOWN + 1], const uint8_t *word, size_t n)
 	out[i] = '\0';
 }
 
+static int is_digit(uint8_t c)
+{
+	return c >= '0' && c <= '9';
+}
+
+/* Whether a line's commas can only be decimal ones: three words or more, which blanks or semicolons part, none with a
+ * point, some with one comma between digits, and no other commas. */
+static int has_decimal_commas(const uint8_t *line, size_t n)
+{
+	const uint8_t *p = memchr(line, ',', n), *end = line + n;
+	int n_words = 0, n_commas;
+
+	if (p == NULL || memchr(line, '.', n) != NULL)
+		return 0;
+	for (p = line; p < end; p++) {
+		if (*p != ',' && is_between(*p))
+			continue;
+		n_words++;
+		for (n_commas = 0; p < end && (*p == ',' || !is_between(*p)); p++)
+			if (*p == ',' && (++n_commas > 1 || p == line || p + 1 == end || !is_digit(p[-1]) || !is_digit(p[1])))
+				return 0;
+	}
+	return n_words >= 3;
+}
+
 int text_split(struct text_row *row, const struct text_points *t, const uint8_t *line, size_t n, struct psr_error *err)
 {
 	const uint8_t *word, *at = line;
@@ -73,6 +98,8 @@ int text_split(struct text_row *row, const struct text_points *t, const uint8_t 
 	size_t length;
 
 	row->n = 0;
+	if (has_decimal_commas(line, n))
+		return text_fail(t, err, "decimal commas: numbers have points here, and commas are between them");
 	while ((length = text_word(&word, &at, line + n)) > 0 && row->n < TEXT_MOST_COLUMNS) {
 		if (!import_number(&row->value[row->n], word, length, t->locale)) {
 			show(shown, word, length);

@@ -56,6 +56,19 @@ static void columns_are_told_by_their_number(void **state)
 	}
 }
 
+/* Only where they cannot be anything else are they taken for decimal ones. */
+static void commas_are_between_numbers(void **state)
+{
+	static const char *const lines[] = { "1,2,3", "1, 2, 3", "1 ,2 ,3", "1 , 2 , 3", "1,2,3 255 0 1", "1,2 3", "1.0,2 3", ",1,2,3," };
+
+	(void)state;
+	for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
+		read_text("t.xyz", lines[i]);
+		assert_int_equal(r.n, 1);
+		assert_at(0, 1.0, 2.0, 3.0);
+	}
+}
+
 static void columns_are_told_by_their_names(void **state)
 {
 	(void)state;
@@ -144,6 +157,8 @@ static void what_is_wrong_is_named_with_its_line(void **state)
 {
 	(void)state;
 	refuse_text("t.xyz", "1 2 3\n1 2 three\n", "line 2: \"three\" is not a number");
+	refuse_text("t.xyz", "1 2 3\n1,5 -2 3,25 \n", "line 2: decimal commas");
+	refuse_text("t.xyz", "1,5;2,5;3,5;255;0;0\n", "line 1: decimal commas");
 	refuse_text("t.xyz", "1 2 3\n\n1 2", "line 3: 2 numbers, but a point has 3; is the file cut short?");
 	refuse_text("t.xyz", "1 2 3 4 5 6\n1 2 3 4 5\n4 5 6 1 2 3\n", "line 2: 5 numbers, but a point has 6");
 	refuse_text("t.xyz", "# nothing\n", "no points");
@@ -176,6 +191,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(columns_are_told_by_their_number),
+		cmocka_unit_test(commas_are_between_numbers),
 		cmocka_unit_test(columns_are_told_by_their_names),
 		cmocka_unit_test(colors_of_0_to_1_and_of_16_bits_are_found_out),
 		cmocka_unit_test(intensities_are_gray_from_black_to_white),
