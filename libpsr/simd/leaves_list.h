@@ -88,25 +88,51 @@ static inline void make_room(struct leaves_lists *to, const struct warp_target *
 	}
 }
 
-/* An entry's cubes follow each other in memory, which the processor foresees; where those of the next one begin, it
- * does not. */
-static inline void fetch_run(const struct warp_target *t, const struct bin_entry *entry)
-{
-	const struct psr_cubes *cubes = t->instance[entry->instance].cubes->model;
-	const uint32_t cube = entry->slot - t->instance[entry->instance].first_slot
-	                      + (uint32_t)__builtin_ctzll(t->cubes[entry->hit]);
-	const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
+/* Cubes of an entry of a run follow each other in memory, but runs do not, and are too short for the processor to
+ * foresee. Their lines are fetched in two steps, since cubes tell where codes are. */
+struct run_ahead {
+	const struct psr_cubes *cubes;
+	uint32_t first, n; /* cubes, from the first to the last one that is drawn */
+};
 
-	__builtin_prefetch(level->tree->code + psr_cubes_code(cubes, level, cube));
-	__builtin_prefetch(&cubes->cube[cube + 4]);
+static inline struct run_ahead run_of(const struct warp_target *t, const struct bin_entry *entry)
+{
+	const struct warp_instance *in = &t->instance[entry->instance];
+	const uint64_t mask = t->cubes[entry->hit];
+	const uint32_t first = (uint32_t)__builtin_ctzll(mask), last = 63 - (uint32_t)__builtin_clzll(mask);
+
+	return (struct run_ahead){ in->cubes->model, entry->slot - in->first_slot + first, last - first + 1 };
+}
+
+#define LINE 64      /* of the cache */
+#define CUBE_CODES 3 /* of a cube and its children, of most clouds; more of a surface's are foreseen */
+
+static inline void fetch_run_cubes(const struct warp_target *t, const struct bin_entry *entry)
+{
+	const struct run_ahead run = run_of(t, entry);
+
+	for (uint32_t i = 0; i < run.n; i += LINE / sizeof *run.cubes->cube)
+		__builtin_prefetch(&run.cubes->cube[run.first + i]);
+}
+
+static inline void fetch_run_codes(const struct warp_target *t, const struct bin_entry *entry)
+{
+	const struct run_ahead run = run_of(t, entry);
+	const struct psr_cube_level *level = psr_cubes_level(run.cubes, run.first);
+	const uint8_t *code = level->tree->code + psr_cubes_code(run.cubes, level, run.first);
+
+	for (uint32_t i = 0; i < CUBE_CODES * run.n; i += LINE)
+		__builtin_prefetch(code + i);
 }
 
 /* Fetches what entries after this one need first. */
 static inline void fetch_next(const struct warp_target *t, const struct bin_entry *entry, uint32_t e, uint32_t n)
 {
 	if (t->cubes != NULL) {
+		if (e + 2 < n)
+			fetch_run_cubes(t, &entry[e + 2]);
 		if (e + 1 < n)
-			fetch_run(t, &entry[e + 1]);
+			fetch_run_codes(t, &entry[e + 1]);
 	} else if (e % BLOCKS == 0) {
 		fetch_cubes(t, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
 		fetch_codes(t, entry + e + BLOCKS, batch_of(e + BLOCKS, n));

@@ -11,12 +11,18 @@
 enum numbers { PLAIN, SPOILT };
 enum kernel { LEAVES, RUNS, WORDS, SUMS };
 
+static uint8_t random_code(struct check *c, int is_few)
+{
+	return is_few && !check_one_in(c, 8) ? (uint8_t)(1u << check_below(c, 8)) : (uint8_t)(1 + check_below(c, 255));
+}
+
 /* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0 and
  * UNEVEN: any. */
 static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, struct psr_cube *cube,
                         const uint32_t n[2])
 {
 	const int is_any = n[1] == 0 || n[1] == UNEVEN;
+	const int is_few = n[1] == 0 && check_one_in(c, 3); /* sparse: most nodes have one child */
 	uint8_t some[64 * 9];
 	uint32_t n_codes = 0, n_leaves = 0;
 
@@ -27,10 +33,10 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 			run[i / CUBES_RUN] = (struct psr_cube_run){ n_codes, n_leaves };
 		cube[i].code = (uint16_t)(n_codes - run[i / CUBES_RUN].code);
 		cube[i].leaf = (uint16_t)(n_leaves - run[i / CUBES_RUN].leaf);
-		some[at] = is_any ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x69;
+		some[at] = is_any ? random_code(c, is_few) : n[1] == 64 ? 255 : n[1] == 2 ? 0x41 : 0x69;
 		n_codes++;
 		for (int j = 0; j < __builtin_popcount(some[at]); j++) {
-			some[n_codes] = is_any ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x4d;
+			some[n_codes] = is_any ? random_code(c, is_few) : n[1] == 64 ? 255 : n[1] == 2 ? 0x10 : 0x4d;
 			n_leaves += (uint32_t)__builtin_popcount(some[n_codes++]);
 		}
 	}
@@ -52,7 +58,7 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 		tree->offset[i] %= OCTREE_OFFSETS;
 }
 
-/* n_cubes of each level, 64 at most; n_leaves of each, 64, 16, UNEVEN, or 0 for any. */
+/* n_cubes of each level, 64 at most; n_leaves of each, 64, 16, 2, UNEVEN, or 0 for any. */
 static struct psr_cubes *random_cubes(struct check *c, uint32_t n_cubes, uint32_t n_leaves, struct octree *tree)
 {
 	struct psr_cubes *cubes = check_in(c, 1, sizeof *cubes);
@@ -321,6 +327,14 @@ static void bench_runs(struct check *c)
 	draw_cubes(c, &p, RUNS, 25, 16, PLAIN);
 }
 
+static void bench_sparse_runs(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	draw_cubes(c, &p, RUNS, 200, 2, PLAIN);
+}
+
 static void bench_uneven_runs(struct check *c)
 {
 	struct picture p;
@@ -346,6 +360,7 @@ int main(int argc, char **argv)
 		{ "warp_leaves, cubes a fourth full", bench_fourths, 0, "leaf" },
 		{ "warp_leaves, these with offsets and depth level 1", bench_offsets, 0, "leaf" },
 		{ "warp_leaves, cubes a fourth full in runs", bench_runs, 0, "leaf" },
+		{ "warp_leaves, cubes of two leaves in runs", bench_sparse_runs, 0, "leaf" },
 		{ "warp_leaves, uneven cubes in runs that may face away", bench_uneven_runs, 0, "leaf" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);

@@ -109,7 +109,7 @@ static inline void list_lanes(uint8_t lane[64], uint64_t mask)
 		44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63,
 	};
 
-	_mm512_store_si512(lane, _mm512_maskz_compress_epi8(mask, _mm512_loadu_si512(ordinals)));
+	_mm512_storeu_si512(lane, _mm512_maskz_compress_epi8(mask, _mm512_loadu_si512(ordinals)));
 }
 
 #endif
