@@ -6,8 +6,8 @@
  * leaves them out), and with blocks of the same object those of blocks take turns, and their times are medians; then
  * those of stages. Points a second are those that are warped, placed in the picture and not facing away, by the time of
  * cull and warp together, splats likewise. As the object fits the picture they stand beside targets, of two threads at
- * 512x512 and leaves of about a pixel, with the part of the tree that they are. [B] tells the leaves of the tree by the
- * time of a whole frame of all of them.
+ * 512x512 and leaves of about a pixel, with the part of the tree that they are. "Whole" is told as [B] tells it there:
+ * the leaves of the tree by the time of a whole frame of all of them.
  *
  * The same picture takes samples as dense. Octrees have leaves of a power of two, blocks any resolution: -b builds
  * blocks of the mesh ("even") whose samples are as far apart as those of the leaves, so that frames take a level of
@@ -207,17 +207,17 @@ static void print_targets(const struct subject *subject, struct times *times, in
 {
 	for (int s = 0; s < n_subjects; s++) {
 		const size_t n = (size_t)times[s].n;
-		const double rate = stats_median(times[s].points, n), frame = stats_median(times[s].frame, n);
+		const double frame = stats_median(times[s].frame, n);
 		const struct octree *tree = psr_model_octree(subject[s].model);
 
 		if (subject[s].representation != PSR_OCTREE)
 			continue;
-		print_rate(subject[s].name, rate, subject[s].with_splats ? TARGET_SPLATS : target);
+		print_rate(subject[s].name,
+		           subject[s].is_whole ? (double)tree->n_leaves / frame * 1e-3 : stats_median(times[s].points, n),
+		           subject[s].with_splats ? TARGET_SPLATS : target);
 		printf("; warped are %.1f %% of %.2f M leaves", 100 * times[s].warped / (double)n / (double)tree->n_leaves,
 		       (double)tree->n_leaves * 1e-6);
-		if (subject[s].is_whole)
-			printf("; as [B] tells it %.0f M a second", (double)tree->n_leaves / frame * 1e-3);
-		printf("\n");
+		printf("%s\n", subject[s].is_whole ? ", told as [B] does" : "");
 	}
 }
 

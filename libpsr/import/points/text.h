@@ -1,8 +1,9 @@
 /* Points as lines of numbers: XYZ and other tables, PTS, PTX.
  *
- * Blanks, commas and semicolons are between numbers. Lines that begin with # or // and empty ones are passed over, but
- * the last such line before the points may name the columns, as may a line that begins with a letter: x y z, r g b or
- * red green blue, i or intensity, nx ny nz, in capitals, too; other columns are passed over. Without names
+ * Blanks, commas and semicolons are between numbers; a line whose commas can only be decimal ones is refused. Lines
+ * that begin with # or // and empty ones are passed over, but the last such line before the points may name the columns, as
+ * may a line that begins with a letter: x y z, r g b or red green blue, i or intensity, nx ny nz, in capitals, too;
+ * other columns are passed over. Without names
  *
  *   3 columns are x y z;  4: and intensity;  6: and red green blue, or a normal if all of the first thousand are of
  *   unit length;  7: x y z intensity red green blue;  9: x y z red green blue nx ny nz;  10: x y z intensity red green

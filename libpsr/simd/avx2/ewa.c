@@ -150,7 +150,8 @@ static inline void draw_sums(const struct warp_target *t, const struct ewa_one *
 			add_columns(t, one, part, same, own, x, radius + 1 - x < 8 ? radius + 1 - x : 8);
 }
 
-static const struct ewa_parts parts = { list_leaves, ewa_sort_words, ewa_sort_sums, ewa_put_normals, draw_words, draw_sums };
+static const struct ewa_parts parts = { list_leaves,     ewa_sort_words, ewa_sort_sums,
+	                                    ewa_put_normals, draw_words,     draw_sums };
 
 uint64_t ewa_words_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
