@@ -252,6 +252,19 @@ static uint64_t estimate(struct text_points *t)
 	return (uint64_t)((double)(n + 1) * (double)(t->feed.n_bytes - t->first) / (double)t->feed.n);
 }
 
+/* Passes over the mark that some programs begin UTF-8 with. */
+static int skip_mark(struct text_points *t, struct psr_error *err)
+{
+	const int rc = feed_need(&t->feed, TEXT_MARK, err);
+
+	if (rc != PSR_OK || t->feed.n < 2)
+		return rc;
+	if ((t->feed.bytes[0] == 0xff && t->feed.bytes[1] == 0xfe) || (t->feed.bytes[0] == 0xfe && t->feed.bytes[1] == 0xff))
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: UTF-16; save it as UTF-8, or as plain text", t->feed.path);
+	t->feed.next = t->first = text_mark(t->feed.bytes, t->feed.n);
+	return PSR_OK;
+}
+
 int text_points_open(struct octree_source *out, const char *path, enum text_kind kind, uint64_t part,
                      struct psr_error *err)
 {
@@ -268,6 +281,8 @@ int text_points_open(struct octree_source *out, const char *path, enum text_kind
 	rc = feed_open(&t->feed, path, err);
 	if (rc == PSR_OK && t->locale == (locale_t)0)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a locale", path);
+	if (rc == PSR_OK)
+		rc = skip_mark(t, err);
 	if (rc == PSR_OK)
 		rc = text_find_columns(t, err);
 	if (rc == PSR_OK)

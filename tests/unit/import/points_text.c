@@ -69,6 +69,23 @@ static void commas_are_between_numbers(void **state)
 	}
 }
 
+static void a_byte_order_mark_is_passed_over(void **state)
+{
+	(void)state;
+	read_text("t.xyz", "\xef\xbb\xbf" "1 2 3\n4 5 6\n");
+	assert_int_equal(r.n, 2);
+	assert_at(0, 1.0, 2.0, 3.0);
+	read_text("t.csv", "\xef\xbb\xbf" "z,y,x\n3,2,1\n");
+	assert_int_equal(r.n, 1);
+	assert_at(0, 1.0, 2.0, 3.0);
+	read_text("t.pts", "\xef\xbb\xbf" "1\n1 2 3\n");
+	assert_int_equal(r.n, 1);
+	assert_at(0, 1.0, 2.0, 3.0);
+	refuse_text("t.xyz", "\xff\xfe" "1\x20" "2 3\n", "UTF-16; save it as UTF-8");
+	refuse_text("t.xyz", "\xef\xbb\xbf", "there are no points");
+	refuse_text("t.xyz", "\xef\xbb" "1 2 3\n", "line 1: \"??1\" is not a number");
+}
+
 static void columns_are_told_by_their_names(void **state)
 {
 	(void)state;
@@ -192,6 +209,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(columns_are_told_by_their_number),
 		cmocka_unit_test(commas_are_between_numbers),
+		cmocka_unit_test(a_byte_order_mark_is_passed_over),
 		cmocka_unit_test(columns_are_told_by_their_names),
 		cmocka_unit_test(colors_of_0_to_1_and_of_16_bits_are_found_out),
 		cmocka_unit_test(intensities_are_gray_from_black_to_white),
