@@ -150,8 +150,97 @@ static inline void draw_sums(const struct warp_target *t, const struct ewa_one *
 			add_columns(t, one, part, same, own, x, radius + 1 - x < 8 ? radius + 1 - x : 8);
 }
 
-static const struct ewa_parts parts = { list_leaves,     ewa_sort_words, ewa_sort_sums,
-	                                    ewa_put_normals, draw_words,     draw_sums };
+/* All bits of a lane set that has a bit. */
+static inline __m256i has_bit(__m256i lanes, int bit)
+{
+	const __m256i bits = _mm256_set1_epi32(bit);
+
+	return _mm256_cmpeq_epi32(_mm256_and_si256(lanes, bits), bits);
+}
+
+static inline __m256i load(const void *from)
+{
+	return _mm256_loadu_si256(from);
+}
+
+/* Lists the words of the pixels of k, lowering those before them where there is no room. */
+static inline void push_words(struct words *words, const struct warp_target *t, __m256i k, const struct warped *s)
+{
+	const __m256 is_far = _mm256_cmp_ps(_mm256_castsi256_ps(s->z), _mm256_set1_ps(t->near_z), _CMP_GT_OQ);
+
+	if (words->n > LIST - 8)
+		lower_words(t->word, words);
+	list_words(words, NULL, _mm256_and_si256(k, _mm256_castps_si256(is_far)), s);
+}
+
+static inline uint32_t any_of(__m256i lanes)
+{
+	__m128i any = _mm_or_si128(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256(lanes, 1));
+
+	any = _mm_or_si128(any, _mm_shuffle_epi32(any, _MM_SHUFFLE(1, 0, 3, 2)));
+	return (uint32_t)(_mm_cvtsi128_si32(any) | _mm_extract_epi32(any, 1));
+}
+
+/* Lists the words of narrow cores of 8 leaves, from leaf i on: a pixel after the other, of all that have it. */
+static inline void list_cores(struct words *words, const struct warp_target *t, const struct ewa_leaves *l, uint32_t i,
+                              __m256i cores)
+{
+	const __m256i left = load(l->x + i), top = load(l->y + i);
+	const __m256i x0 = _mm256_set1_epi32(t->x0), y0 = _mm256_set1_epi32(t->y0);
+	const __m256i down_or_up = _mm256_sub_epi32(_mm256_set1_epi32(1), _mm256_slli_epi32(load(l->is_flipped + i), 1));
+	const __m256 middle = _mm256_loadu_ps(l->z + i), least = _mm256_loadu_ps(l->least + i);
+	const __m256 zx = _mm256_loadu_ps(l->zx + i), zy = _mm256_loadu_ps(l->zy + i);
+	struct warped s = { .id = load(l->id + i) };
+
+	for (uint32_t any = any_of(cores); any; any &= any - 1) {
+		const uint32_t bit = (uint32_t)__builtin_ctz(any);
+		const __m256i dx = _mm256_set1_epi32((int32_t)(bit % EWA_CORE_SIDE) - EWA_CORE_RADIUS);
+		const __m256i down = _mm256_set1_epi32((int32_t)(bit / EWA_CORE_SIDE) - EWA_CORE_RADIUS);
+		const __m256i dy = _mm256_sign_epi32(down, down_or_up);
+		const __m256i x = _mm256_add_epi32(left, dx), y = _mm256_add_epi32(top, dy);
+		const __m256 across = _mm256_mul_ps(_mm256_cvtepi32_ps(dx), zx);
+		const __m256 slope = _mm256_add_ps(across, _mm256_mul_ps(_mm256_cvtepi32_ps(dy), zy));
+		const __m256i is_inside = _mm256_and_si256(within(x, t->x0, t->x1), within(y, t->y0, t->y1));
+		const __m256i row = _mm256_mullo_epi32(_mm256_sub_epi32(y, y0), _mm256_set1_epi32((int)t->stride));
+
+		s.z = _mm256_castps_si256(_mm256_max_ps(_mm256_add_ps(middle, slope), least));
+		s.at = _mm256_add_epi32(row, _mm256_sub_epi32(x, x0));
+		push_words(words, t, _mm256_and_si256(is_inside, has_bit(cores, 1 << bit)), &s);
+	}
+}
+
+static inline uint32_t sort_words(struct words *words, struct ewa_sorted *sorted, const struct ewa_leaves *l,
+                                  const struct warp_target *t)
+{
+	const __m256i none = _mm256_set1_epi32(-1), narrow = _mm256_set1_epi32(EWA_NARROW + 1);
+	__m256i number = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+	uint32_t n_inside = 0;
+
+	sorted->n_masks = 0;
+	for (uint32_t i = 0; i < l->n; i += 8, number = _mm256_add_epi32(number, _mm256_set1_epi32(8))) {
+		const __m256i pixel = load(l->pixel + i), size = load(l->size + i), mask = load(l->has_mask + i);
+		const __m256i is_one = _mm256_xor_si256(_mm256_cmpeq_epi32(pixel, none), none), has_mask = has_bit(mask, 1);
+		const __m256i is_narrow = _mm256_and_si256(has_mask, _mm256_cmpgt_epi32(narrow, size));
+		const uint32_t others = bits_of(_mm256_andnot_si256(is_narrow, has_mask));
+		const struct warped ones = { .at = pixel, .id = load(l->id + i), .z = load(l->pixel_z + i) };
+
+		n_inside += (uint32_t)__builtin_popcount(bits_of(_mm256_or_si256(is_one, has_bit(mask, 2))));
+		push_words(words, t, is_one, &ones);
+		if (bits_of(is_narrow)) {
+			const __m256i first = _mm256_mullo_epi32(size, _mm256_set1_epi32(EWA_SHAPES * EWA_SECTORS));
+
+			list_cores(words, t, l, i,
+			           _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), (const int *)ewa_core_bits,
+			                                       _mm256_add_epi32(first, load(l->mask + i)), is_narrow, 4));
+		}
+		store(sorted->mask + sorted->n_masks, _mm256_permutevar8x32_epi32(number, front_of(others)));
+		sorted->n_masks += (uint32_t)__builtin_popcount(others);
+	}
+	return n_inside;
+}
+
+static const struct ewa_parts parts = { list_leaves,     sort_words, ewa_sort_sums,
+	                                    ewa_put_normals, draw_words, draw_sums };
 
 uint64_t ewa_words_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
