@@ -41,14 +41,13 @@ static int check_options(const struct psr_import_options *options, struct psr_er
  * decides otherwise. */
 static int is_gltf(const char *path, const uint8_t *bytes, size_t n_bytes)
 {
-	size_t i = 0, n = n_bytes < SNIFF_BYTES ? n_bytes : SNIFF_BYTES;
+	const size_t n = n_bytes < SNIFF_BYTES ? n_bytes : SNIFF_BYTES;
+	size_t i = import_mark(bytes, n);
 
 	if (n >= 4 && memcmp(bytes, "glTF", 4) == 0)
 		return 1;
 	if (import_path_ends_with(path, ".gltf") || import_path_ends_with(path, ".glb"))
 		return 1;
-	if (n >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0)
-		i = 3;
 	while (i < n && strchr(" \t\r\n", bytes[i]) != NULL && bytes[i] != '\0')
 		i++;
 	return i < n && bytes[i] == '{' && memmem(bytes + i, n - i, "\"asset\"", 7) != NULL;

@@ -9,6 +9,7 @@
 #include <locale.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 #include "psr/mesh.h"
 
 #ifdef __cplusplus
@@ -185,7 +186,15 @@ int import_cad(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 /* cad/cad.c: returns whether a file is STEP or IGES, by its first bytes or its ending. */
 int import_cad_is(const char *path, const uint8_t *bytes, size_t n_bytes);
 
+/* Returns how long the byte order mark is that some programs begin UTF-8 with: IMPORT_MARK, or 0. */
+#define IMPORT_MARK 3
+static inline size_t import_mark(const uint8_t *bytes, size_t n)
+{
+	return n >= IMPORT_MARK && memcmp(bytes, "\xef\xbb\xbf", IMPORT_MARK) == 0 ? IMPORT_MARK : 0;
+}
+
 #ifdef __cplusplus
 }
 #endif
+
 #endif

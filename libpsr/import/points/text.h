@@ -74,9 +74,6 @@ int text_next_line(struct text_points *t, const uint8_t **line, size_t *n, struc
 int text_is_comment(const uint8_t *line, size_t n); /* or empty */
 /* Takes the next word of a line; returns its length, 0 at the end. */
 size_t text_word(const uint8_t **word, const uint8_t **at, const uint8_t *end);
-/* Returns how long the byte order mark is that a file begins with: TEXT_MARK, or 0. */
-#define TEXT_MARK 3
-size_t text_mark(const uint8_t *bytes, size_t n);
 int text_fail(const struct text_points *t, struct psr_error *err, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
 

@@ -224,7 +224,7 @@ static int count_numbers(const uint8_t *line, size_t n, locale_t locale)
 
 int text_looks_like_points(const uint8_t *bytes, size_t n_bytes)
 {
-	const uint8_t *line = bytes + text_mark(bytes, n_bytes), *end = bytes + n_bytes;
+	const uint8_t *line = bytes + import_mark(bytes, n_bytes), *end = bytes + n_bytes;
 	locale_t locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
 	int n = 1; /* a number by itself says how many points there are */
 

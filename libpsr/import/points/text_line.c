@@ -19,11 +19,6 @@ int text_fail(const struct text_points *t, struct psr_error *err, const char *fo
 	                (unsigned long long)(t->step > 1 ? t->feed.at + t->feed.next : t->line), text);
 }
 
-size_t text_mark(const uint8_t *bytes, size_t n)
-{
-	return n >= TEXT_MARK && memcmp(bytes, "\xef\xbb\xbf", TEXT_MARK) == 0 ? TEXT_MARK : 0;
-}
-
 static int is_between(uint8_t c)
 {
 	return c == ' ' || c == ',' || c == ';' || (c >= '\t' && c <= '\r');

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "text.h"
+#include "import/import.h"
 
 #define RUN ((uint64_t)16384) /* bytes */
 
@@ -255,13 +256,13 @@ static uint64_t estimate(struct text_points *t)
 /* Passes over the mark that some programs begin UTF-8 with. */
 static int skip_mark(struct text_points *t, struct psr_error *err)
 {
-	const int rc = feed_need(&t->feed, TEXT_MARK, err);
+	const int rc = feed_need(&t->feed, IMPORT_MARK, err);
 
 	if (rc != PSR_OK || t->feed.n < 2)
 		return rc;
 	if ((t->feed.bytes[0] == 0xff && t->feed.bytes[1] == 0xfe) || (t->feed.bytes[0] == 0xfe && t->feed.bytes[1] == 0xff))
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: UTF-16; save it as UTF-8, or as plain text", t->feed.path);
-	t->feed.next = t->first = text_mark(t->feed.bytes, t->feed.n);
+	t->feed.next = t->first = import_mark(t->feed.bytes, t->feed.n);
 	return PSR_OK;
 }
 

@@ -40,12 +40,6 @@ static inline void list_leaves(struct ewa_leaves *l, const struct warp_target *t
 	l->n += n;
 }
 
-/* Masks that reach beyond the tile's columns are drawn pixel by pixel. */
-static inline int has_columns(const struct warp_target *t, int32_t first, int32_t end)
-{
-	return first >= 0 && end <= t->x1 - t->x0;
-}
-
 /* The depths of eight columns: at dx from the middle's, in a row at dy. */
 static inline __m256 depths_of(const struct ewa_one *one, __m256i dx, int32_t dy)
 {
@@ -79,7 +73,7 @@ static inline void draw_words(const struct warp_target *t, const struct ewa_one 
 	const __m256i id = _mm256_set1_epi64x(one->id);
 	const __m256 near_z = _mm256_set1_ps(t->near_z);
 
-	if (!has_columns(t, begin, begin + ((end - begin + 7) & ~7))) {
+	if (!ewa_has_columns(t, begin, (end - begin + 7) & ~7)) {
 		ewa_draw_words(t, one, part);
 		return;
 	}
@@ -141,7 +135,7 @@ static inline void draw_sums(const struct warp_target *t, const struct ewa_one *
 	const int32_t radius = one->radius, side = 2 * radius + 1, first = one->x - radius - t->x0;
 	const __m256i own = _mm256_loadu_si256((const __m256i *)value);
 
-	if (!has_columns(t, first, first + ((side + 7) & ~7)))
+	if (!ewa_has_columns(t, first, (side + 7) & ~7))
 		ewa_draw_sums(t, one, part, same, value);
 	else if (radius == 1) /* most often */
 		add_columns(t, one, part, same, own, -1, 3);

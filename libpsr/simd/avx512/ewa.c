@@ -58,12 +58,6 @@ struct rows {
 	int32_t n;         /* rows */
 };
 
-/* Masks whose pieces reach beyond the tile's columns are drawn pixel by pixel. */
-static inline int has_columns(const struct warp_target *t, int32_t begin, int32_t n)
-{
-	return begin >= 0 && begin + n <= t->x1 - t->x0;
-}
-
 /* Begins with the pixels from column `begin` of the tile on, 8 or 16 a row; `reach` to each side of the middle count. */
 static inline __attribute__((always_inline)) void begin_rows(struct rows *rows, const struct warp_target *t,
                                                              const struct ewa_one *one, const struct ewa_part *part,
@@ -137,7 +131,7 @@ static inline void draw_words(const struct warp_target *t, const struct ewa_one 
 	const int32_t begin = (one->x - t->x0 - one->core_radius) & ~3;
 	struct rows rows;
 
-	if (!has_columns(t, begin, 16)) {
+	if (!ewa_has_columns(t, begin, 16)) {
 		ewa_draw_words(t, one, part);
 		return;
 	}
@@ -195,7 +189,7 @@ static inline __attribute__((always_inline)) void add_mask(const struct warp_tar
 	const __m512 behind = _mm512_set1_ps(same);
 	struct rows rows;
 
-	if (!has_columns(t, begin, 2 * n_pairs)) {
+	if (!ewa_has_columns(t, begin, 2 * n_pairs)) {
 		ewa_draw_sums(t, one, part, same, value);
 		return;
 	}

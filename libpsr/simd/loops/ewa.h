@@ -52,6 +52,13 @@ static inline int ewa_clip(struct ewa_part *part, const struct warp_target *t, i
 	return part->x0 < part->x1 && part->y0 < part->y1;
 }
 
+/* Whether n columns from the tile's column `begin` on are in it: vectors draw masks where all that they touch are, and
+ * pixel by pixel other ones. */
+static inline int ewa_has_columns(const struct warp_target *t, int32_t begin, int32_t n)
+{
+	return begin >= 0 && begin + n <= t->x1 - t->x0;
+}
+
 /* The depth at an offset from the middle pixel. */
 static inline float ewa_depth(const struct ewa_one *one, float dx, float dy)
 {
